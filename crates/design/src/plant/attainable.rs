@@ -14,7 +14,7 @@ use plant_file::requirements::{Bandwidth, Requirement};
 
 /// Real parts above this part of the modulus count as positive.
 const RIGHT: f64 = 1e-9;
-/// Above this peak of S a loop exists on paper only, and its gains are rounding.
+/// Peak of S above which a loop cannot be realised: its gains would be rounding errors.
 const NO_LOOP: f64 = 1e6;
 /// |S| is at most this up to the bandwidth.
 const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -125,7 +125,7 @@ fn of_zero(
     if zero.im != 0.0 || reached <= limit {
         return None;
     }
-    // The exponent t with which the bound is the limit, and the speed that gives it.
+    // The exponent t for which the bound is the limit, and the speed that gives this t.
     let t = (limit / AT_BANDWIDTH).ln() / (least / AT_BANDWIDTH).ln();
     let allowed = zero.re * (std::f64::consts::PI * (1.0 - 1.0 / t) / 2.0).tan();
     let message = format!(
@@ -152,7 +152,7 @@ fn least_peak(zero: Complex<f64>, least: f64, speed: f64) -> f64 {
 }
 
 /// Returns the modulus of the slowest eigenvalue that the file states for the feedback, or the stated bandwidth, rad/s;
-/// None for other requirements, and if all eigenvalues of a sampled loop are 0, whose modulus is infinite.
+/// None for other requirements, and if all eigenvalues of a sampled loop are 0, with an infinite rate.
 fn requested(file: &PlantFile<'_>) -> Option<f64> {
     let slowest = |sizes: &mut dyn Iterator<Item = f64>| sizes.min_by(f64::total_cmp);
     match &file.feedback.requirement {

@@ -1,4 +1,4 @@
-//! The delays of a plant: the states that approximate them, in the observer and for the judgement.
+//! The delays of a plant: the states that approximate them, in the observer and for the verdict.
 
 use control::StateSpace;
 use control::delay::{Delays, pade};
@@ -13,8 +13,8 @@ use control::blocks::beside;
 use plant_file::PlantFile;
 use plant_file::signals::Signal;
 
-/// Number of states for each delay in the plant of the judgement: the error of its approximation is below 2e-7 up to 7
-/// rad in the delay.
+/// Number of states for each delay in the plant for the verdict: the error of the approximation is below 2e-7 up to the
+/// frequency with 7 rad in the time of the delay.
 pub(crate) const JUDGED: usize = 10;
 
 /// Smallest ratio of a delay to the plant's fastest time constant that is allowed, and inverse of the largest one:

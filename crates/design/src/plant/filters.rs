@@ -1,5 +1,5 @@
-//! The filters of PI, PID and other controllers of low order: states of the observer's model that only the controller
-//! has.
+//! The filters of PI, PID and other controllers of low order: states of the observer's model that are in the
+//! controller, not in the plant.
 //!
 //! ```text
 //! z' = F z + g y,   F = -w, g = w                                     PI
@@ -87,7 +87,7 @@ pub(crate) fn with_filters(pid: &Pid, plant: &StateSpace) -> Result<StateSpace, 
     Ok(extended)
 }
 
-/// Replaces the filters in a plant that was sampled together with them: they take samples of the measurements.
+/// Replaces the filters of a plant that was sampled with them by filters of the samples of its measurements.
 ///
 /// `c`: of the plant with the filters, p x n.
 pub(crate) fn sample(

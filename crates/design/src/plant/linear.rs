@@ -110,7 +110,7 @@ impl LinearPlant {
         }
     }
 
-    /// Returns the plant from the commands to the measurements for the judgement: with better approximations of its
+    /// Returns the plant from the commands to the measurements for the verdict: with better approximations of its
     /// delays, and without filters.
     pub(crate) fn judged(&self) -> Result<StateSpace, Error> {
         self.delays.approximated(&self.undelayed, delays::JUDGED)
@@ -155,7 +155,7 @@ impl LinearPlant {
         }
     }
 
-    /// Returns the part of matrices of the form of [`Self::judged`] that belongs to the plant without delays.
+    /// Returns the part of matrices, shaped as those of [`Self::judged`], that belongs to the plant without delays.
     pub(crate) fn of_plant(&self, matrices: &[DMatrix<f64>; 4]) -> [DMatrix<f64>; 4] {
         self.delays.of_plant(self.undelayed.a.nrows(), delays::JUDGED, matrices)
     }
@@ -507,8 +507,8 @@ fn entry(
     }
 }
 
-/// Returns the largest error of an entry, relative to the largest entry of its row: that of differences, or the
-/// contradiction of directional derivatives to differences; None if no error is known.
+/// Returns the largest error of an entry, relative to the largest entry of its row: the error of differences, or the
+/// deviation of directional derivatives from differences; None if no error is known.
 fn inaccuracy(linearised: &Linearisation) -> Option<f64> {
     match &linearised.method {
         Method::FiniteDifferences { .. } => linearised.relative_error(),
@@ -561,7 +561,7 @@ mod tests {
         DMatrix::from_row_slice(1, entries.len(), entries)
     }
 
-    /// `x' = A x + 2 u_1 + u_2`, `y = x + D u + G f`, with errors of these sizes of A, and of D and G.
+    /// `x' = A x + 2 u_1 + u_2`, `y = x + D u + G f`, with the error `of_a` of A, and `of_direct` of D and G.
     fn differences([a, d, g]: [&[f64]; 3], [of_a, of_direct]: [f64; 2]) -> Linearisation {
         let matrices = linearise::Matrices {
             a: row(a),

@@ -176,7 +176,7 @@ mod tests {
     use super::*;
     use crate::tests::read;
 
-    /// The relative error of a row of zeros is infinite, and of rounding.
+    /// The relative error of a row of zeros is infinite, but only rounding.
     #[test]
     fn errors_of_a_linearisation_above_one_percent_are_a_warning() {
         let text = "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\n";

@@ -15,8 +15,8 @@ use plant_file::requirements::Bandwidth;
 const SLOWER: f64 = 8.0;
 
 impl FeedbackProblem<'_> {
-    /// Returns the regulator with the cost of the measurements, and of the integrals of references with weights that
-    /// make them slower by [`SLOWER`].
+    /// Returns the regulator whose cost weights the measurements, and the integrals of references so that they are
+    /// slower by [`SLOWER`].
     pub(crate) fn by_bandwidth(
         &self,
         bandwidth: &Bandwidth,

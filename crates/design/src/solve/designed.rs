@@ -21,7 +21,6 @@ pub(crate) struct Designed {
     pub(crate) warnings: Vec<PlaceError>,
 }
 
-/// Designs the controller for `file`.
 pub(crate) fn design(file: &PlantFile<'_>) -> Result<Designed, crate::Error> {
     design_by(file, &file.estimation.law)
 }

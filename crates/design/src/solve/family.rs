@@ -77,8 +77,8 @@ pub(crate) fn check_states(
     Err(file.error_at(&variant.place, message))
 }
 
-/// Computes one K_x for the nominal plant and all members, with its certificate; with integral action one
-/// K = [K_x, K_i] for all of them with their integrals.
+/// Computes one K_x for the nominal plant and all members, with its certificate; with integral action one K = [K_x,
+/// K_i] for all plants with their integrals.
 pub(crate) fn common_feedback(
     nominal: &LinearPlant,
     members: &[Member],

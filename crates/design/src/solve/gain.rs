@@ -1,4 +1,4 @@
-//! A gain with the method that found it, and why there is none.
+//! The results of the search for a gain.
 
 use control::lmi::{Outcome, Synthesis};
 use control::placement::Quality;
@@ -19,7 +19,7 @@ pub(crate) struct GainResult {
     pub(crate) required: Vec<Complex<f64>>,
     /// The quality of an eigenvalue assignment.
     pub(crate) quality: Option<Quality>,
-    /// The H-infinity norm, of a design by it.
+    /// The H-infinity norm, if the gain was designed by it.
     pub(crate) norm: Option<NormReport>,
     /// The noise of a Kalman filter.
     pub(crate) noise: Option<Box<Noise>>,

@@ -20,7 +20,7 @@ use plant_file::loop_shape::LoopShape;
 use plant_file::references::References;
 use plant_file::signals::same_unit;
 
-/// Smallest |S| that is asked for at low frequencies, and smallest |T| at high ones, relative to its peak.
+/// Smallest |S| that is required at low frequencies, and smallest |T| at high ones, relative to its peak.
 const FLOOR: f64 = 0.01;
 /// Number of starts that are tuned: those with the lowest gamma, the largest weighted gain over all terms.
 const TUNED: usize = 4;
@@ -33,7 +33,7 @@ const DECAY_OF_INTEGRALS: f64 = 0.9;
 const DECAY_OF_ESTIMATES: f64 = 0.5;
 /// Smallest size of an entry of a gain, relative to the average of its row and its column.
 const SMALLEST: f64 = 0.1;
-/// Part of half the sampling rate up to which the roll-off is asked for.
+/// Part of half the sampling rate up to which the roll-off is required.
 const BELOW_NYQUIST: f64 = 0.8;
 
 /// What the gains are tuned for.
@@ -185,7 +185,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let controller = complete_controller(plant, &gains, filter, domain)?.commands;
         let (to, from) = (inverse(&units.commands), inverse(&units.measurements));
         let (p, t) = (from.ncols(), units.references.ncols());
-        // The integrals are the last states: T r enters them.
+        // The integrals are the last states: r enters them, times the sample time.
         let mut b = (&controller.b * &from).resize_horizontally(p + t, 0.0);
         let first = b.nrows() - t;
         b.view_mut((first, p), (t, t)).copy_from(&(inverse(&units.references) * domain.step()));

@@ -31,9 +31,9 @@ const ROUNDED: f64 = 1.05;
 
 /// The augmented dynamics, and what the channel of the observer depends on.
 pub(crate) struct ObserverProblem<'a> {
-    /// `A_0`.
+    /// `A_0`, the dynamics of the plant with the models of its faults.
     pub(crate) a_0: &'a DMatrix<f64>,
-    /// `C_0`.
+    /// `C_0`, the measurements of this plant.
     pub(crate) c_0: &'a DMatrix<f64>,
     /// B of the plant with its filter.
     pub(crate) b: &'a DMatrix<f64>,
@@ -65,7 +65,7 @@ impl ObserverProblem<'_> {
     /// x' = (A - L C) x + (B - L D_y) [rates; noise],  z = W E x
     /// ```
     ///
-    /// W is the weights, E selects the states of the fault models. Without a measurement filter the noise enters
+    /// W are the weights; E selects the states of the fault models. Without a measurement filter the noise enters
     /// through `D_y`, with one through the filter's states. A current estimator corrects with the newest measurement:
     /// `D_y` then has `C_0` B, too. In sampled time a rate acts for one period.
     fn performance(&self, required: NormRequirement<'_>) -> Performance {
@@ -166,7 +166,7 @@ impl ObserverProblem<'_> {
             return Ok(self.noisy_lower_bound(required)?.map(LowerBound::for_filters));
         }
         let (a, c, performance) = self.extended(required)?;
-        // A bound whose computation fails is not known; the gain does not depend on it.
+        // If this computation fails, there is no bound; the gain does not depend on it.
         let of_filters =
             noiseless_norm_lower_bound(&a, &c, &performance, required.domain).unwrap_or(None);
         let Region { decay, disc, .. } = required.region;

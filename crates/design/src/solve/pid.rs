@@ -19,7 +19,7 @@ use plant_file::references::References;
 /// Decay rate that a start should reach, relative to that of the state feedback from which it is derived.
 const DECAY: f64 = 0.5;
 
-/// The structure of the feedback: which of its entries the controllers have.
+/// The structure that the controllers give to the feedback.
 pub(crate) struct PidProblem<'a> {
     pub(crate) pid: &'a Pid,
     pub(crate) shape: &'a LoopShape,
@@ -53,8 +53,8 @@ impl PidProblem<'_> {
         self.pid.pairs.iter().flat_map(of).collect()
     }
 
-    /// Returns the controllers that are nearest to a state feedback and stable, if that can be reached, the observer
-    /// with their filters, and the instability of this feedback.
+    /// Returns the controllers nearest to a state feedback, stable if possible; the observer with their filters; and
+    /// the instability of this feedback.
     fn start(
         &self,
         [feedback, observer]: &[DMatrix<f64>; 2],

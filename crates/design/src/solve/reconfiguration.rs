@@ -43,7 +43,7 @@ pub(crate) struct Reconfigurations {
     pub(crate) fallback: Option<Fallback>,
 }
 
-/// The controller without an actuator.
+/// The controller for an actuator that is gone.
 pub(crate) struct Reconfiguration {
     pub(crate) actuator: usize,
     pub(crate) stuck_at: f64,
@@ -51,11 +51,11 @@ pub(crate) struct Reconfiguration {
     pub(crate) gains: Option<ReconfiguredGains>,
     /// The states of the fault model that restart at 0.
     pub(crate) restart: Vec<usize>,
-    /// Loss and time, in s, of the decision by the estimate.
+    /// Loss and time, in s: the actuator counts as gone after its estimated loss was larger for this time.
     pub(crate) decision: Option<(f64, f64)>,
 }
 
-/// The controller without several actuators.
+/// The controller for several actuators that are gone.
 pub(crate) struct Combination {
     /// In ascending order.
     pub(crate) gone: Vec<usize>,
@@ -356,7 +356,7 @@ impl Without<'_> {
             let unit = equilibrium(&at_rest, &actuators, &output, &b_g)?;
             let answer = &unit.u - k_x * &unit.x;
             for channel in self.faults_of(actuator) {
-                // The intact gain has the mean of the modelled fault over a sample.
+                // The intact gain compensates the mean of the modelled fault over a sample.
                 let intact = modelled.row(actuator);
                 let columns = [Some(channel.estimate), channel.rate];
                 for column in columns.into_iter().flatten() {

@@ -200,7 +200,7 @@ fn feedback_of_family(
 }
 
 /// Returns the instability of plant and controller; with delays the larger one for two plants: that of the design, and
-/// that of the judgement, which approximates delays better.
+/// that of the verdict, which approximates delays better.
 fn instability_of(model: LoopModel<'_>, gains: &Gains, whole: &DesignLoop) -> Result<f64, Error> {
     let LoopModel { linear, plant, domain, .. } = model;
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;

@@ -30,7 +30,7 @@ pub(crate) struct Tracking {
     pub(crate) signals: Vec<Signal>,
     /// The size of the step of each reference that the report shows, if stated.
     pub(crate) steps: Vec<Option<f64>>,
-    /// H, t x p.
+    /// H, t x p, from the measurements to the quantities that follow references.
     pub(crate) h: DMatrix<f64>,
     /// H C, t x n, of the plant without filter.
     pub(crate) output: DMatrix<f64>,
@@ -41,14 +41,14 @@ pub(crate) struct Tracking {
 pub(crate) enum TrackingAction {
     /// Integral action, whose gain is in the design's gains.
     Integral {
-        /// L_w, t x m, where commands have limits.
+        /// L_w, t x m, the gain of the back-calculation, if commands have limits.
         windup: Option<DMatrix<f64>>,
         /// Time constant of the back-calculation, s.
         windup_time: f64,
-        /// N_r, m x t, beside the integrals.
+        /// N_r and the modes that it leaves at rest, if there is a feedforward beside the integrals.
         feedforward: Option<IntegralFeedforward>,
     },
-    /// N_r, m x t.
+    /// N_r, m x t, from the references to the commands.
     Feedforward(DMatrix<f64>),
 }
 

@@ -172,8 +172,8 @@ impl Search<'_> {
         })
     }
 
-    /// Returns a sentence about the norm that a gain reaches that need not keep the region; None without a region,
-    /// above [`LARGEST_ORDER`] states, and if no gain is found.
+    /// Returns a sentence about the norm of a gain that ignores the region; None without a region, above
+    /// [`LARGEST_ORDER`] states, and if no gain is found.
     fn without_region(&self) -> Result<Option<String>, Error> {
         let order = self.performance.output.ncols();
         if self.required.region == Region::default() || order > LARGEST_ORDER {

@@ -87,7 +87,7 @@ fn windup(
 
 /// Examines the feedforward between the points: a warning if a reference is exact at the points only.
 ///
-/// Between them the constant H y is G N_r r, G = H C (I - A - B K_x)^-1 B, in continuous time H C (-A - B K_x)^-1 B,
+/// Between the points H y at rest is G N_r r, G = H C (I - A - B K_x)^-1 B, in continuous time H C (-A - B K_x)^-1 B,
 /// with all matrices interpolated.
 fn feedforward(
     file: &PlantFile<'_>,
