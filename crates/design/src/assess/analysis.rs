@@ -1,4 +1,4 @@
-//! Analyses the closed loop of a design: the numbers of the report.
+//! Computes the gains, norms and bounds of the estimation errors.
 
 use control::response::{
     SampledLoop, energy, error_part, fault_gains, fault_rate_system, fault_system, frequency_grid,
@@ -13,7 +13,7 @@ use crate::report::{Bound, Frequency, Norm};
 use crate::solve::solution::Solution;
 use plant_file::faults::Fault;
 
-/// Relative width of the brackets of peak gains and norms.
+/// Relative width of the bracket of a peak gain or a norm.
 const WIDTH: f64 = 1e-3;
 /// Number of equal parts of a sample time. A fault is constant over each part; the states are read at its start.
 const PARTS: u32 = 16;
@@ -49,8 +49,8 @@ pub(crate) fn outputs(designed: &Solution) -> Vec<Output> {
     of_state(0, "").chain(of_state(all, "error of ")).chain(of_faults).collect()
 }
 
-/// Returns the H-infinity norm, and how it was computed. If the level sets do not converge, as with a zero of the
-/// whole system at z = 1, it is the largest value on a grid of frequencies.
+/// Returns the H-infinity norm, and how it was computed. If the level sets do not converge, as with a zero of the whole
+/// system at z = 1, the norm is the largest value on a grid of frequencies.
 pub(crate) fn largest_gain(system: &StateSpace) -> Result<(f64, &'static str), Error> {
     match h_infinity(system, WIDTH) {
         Ok(norm) => Ok((norm.upper, "largest singular value over all frequencies (level sets)")),
@@ -113,11 +113,11 @@ impl<'a> Loops<'a> {
         channels.zip(&designed.linear.faults)
     }
 
-    /// Returns the peak-to-peak gains of each output. Those of a sampled loop also hold between its samples, if its
-    /// plant is known there.
+    /// Returns the peak-to-peak gains of each output. For a sampled loop they also hold between the samples, if the
+    /// plant is known in continuous time.
     ///
-    /// The errors of the faults are computed first, then those of the states, then the states. Outputs that are left
-    /// when the time of `budget` is over are [`Missing::Time`].
+    /// The errors of the faults are computed first, then those of the states, then the states. Outputs for which the
+    /// time of `budget` is too short are [`Missing::Time`].
     fn peak_gains(&self, budget: &Budget) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let positions: Vec<_> = self.outputs.iter().map(|output| output.row).collect();
         let mut peaks = vec![Err(Missing::Time); positions.len()];
@@ -182,7 +182,7 @@ impl<'a> Loops<'a> {
             for (output, gains) in self.outputs.iter().zip(&gains) {
                 let Ok([from_faults, from_rates, from_rest]) = gains else { continue };
                 let of_fault = from_faults[column];
-                // A constant fault that leaves a lasting error has no bound by its rate.
+                // If a constant fault leaves a lasting error, the error has no bound by the rate of the fault.
                 let leaks = self.designed.law.leaks();
                 let of_rate = if leaks { f64::INFINITY } else { from_rates[column] };
                 let left = from_rest[column];
@@ -233,8 +233,8 @@ impl<'a> Loops<'a> {
         }
     }
 
-    /// Returns the singular values from the faults to their estimates and to the estimation errors; unless a constant
-    /// fault leaves a lasting error, also those from the rates of the faults to these errors.
+    /// Returns the singular values from the faults to their estimates and to the estimation errors, and from the rates
+    /// of the faults to these errors unless a constant fault leaves a lasting error.
     pub(crate) fn frequency(&self) -> Result<Vec<Frequency>, Error> {
         let errors = self.to_fault_errors(&self.of_faults);
         let mut estimates = errors.clone();

@@ -60,7 +60,7 @@ const WITHOUT_SPEED: f64 = 1.0;
 ///
 /// # Errors
 ///
-/// The gains of the first candidates cannot be computed: the error also says what no controller of the plant reaches.
+/// The gains of the first candidates cannot be computed: the error also says what no controller of the plant can reach.
 /// No candidate has a stable loop. The plant cannot be read.
 pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantFile<'a>, Error> {
     if !file.feedback.is_open() && !file.observer.is_open() {
@@ -145,7 +145,7 @@ fn with<'a>(file: &PlantFile<'a>, feedback: f64, observer: f64) -> PlantFile<'a>
 }
 
 /// Returns the speed of the plant in rad/s, to which the bandwidths are relative: a stated bandwidth of the feedback,
-/// or the median of the moduli of the eigenvalues, those stated for the feedback or else those of the plant.
+/// else the median of the moduli of the eigenvalues that are stated for the feedback, else of those of the plant.
 ///
 /// Eigenvalues that are 0 up to rounding errors do not count; if no other ones exist, the median is replaced by
 /// [`WITHOUT_SPEED`]. The result is raised to twice the largest real part, then limited by sample time and delays.

@@ -17,7 +17,7 @@ const ALPHA: f64 = 1.0;
 /// with the sixth power.
 const LARGEST_ORDER: usize = 30;
 
-/// Returns all certificates for `designed`; `norms` were computed before.
+/// Returns all certificates for `designed`, with `norms` among them.
 pub(crate) fn certificate(designed: &Solution, norms: Vec<Norm>, budget: &Budget) -> Certificate {
     Certificate {
         printed: printed(designed),

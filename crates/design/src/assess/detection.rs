@@ -51,10 +51,10 @@ struct Part<'a> {
 /// A test of combinations of the residuals of a filter.
 struct PlannedTest {
     name: String,
-    /// The combinations: rows x residuals of the filter.
+    /// One combination in each row; rows x residuals of the filter.
     rows: DMatrix<f64>,
     kind: TestKind,
-    /// The largest length of the mean of the residuals that errors of the model cause, in standard deviations.
+    /// The largest norm of the mean of the residuals that model errors cause, in standard deviations.
     bias: f64,
     /// Relative excess of the largest of these means within the limits of parameters over that at the corners; None
     /// unless parameters of an FMU vary.
@@ -86,7 +86,7 @@ pub(crate) fn detection(
     Ok(Some(Detection { section, report, warnings }))
 }
 
-/// Refuses schedules, and families that the tests cannot allow for.
+/// Refuses schedules, families of an FMU, and families without `model_error`.
 fn check_plants(file: &PlantFile<'_>, request: &DetectionRequest) -> Result<(), crate::Error> {
     let message = if file.schedule.is_some() {
         "the thresholds rely on residuals that are white with variance 1, which interpolated filters give at the \
@@ -218,7 +218,7 @@ fn reacting(
         .collect()
 }
 
-/// Returns the largest length of a column.
+/// Returns the largest norm of a column.
 fn largest(means: &DMatrix<f64>) -> f64 {
     means.column_iter().map(|column| column.norm()).fold(0.0, f64::max)
 }
@@ -330,7 +330,7 @@ fn fault_report(
         size,
         test: test.name.clone(),
         mean: (&test.rows * decoupling.steady_mean(input)?).norm(),
-        // A fault starts between two samples: half a sample before the first one with it, on average.
+        // On average a fault starts half a sample before the first sample that shows it.
         delay: delay.mean().map(|samples| (samples - 0.5) * period),
         #[expect(clippy::cast_precision_loss, reason = "numbers of samples")]
         delay_90: delay.quantile(0.9).map(|samples| samples as f64 * period),
@@ -339,8 +339,8 @@ fn fault_report(
     })
 }
 
-/// Warns of faults that no test tells apart, of parameters that are worst within their limits, and of disturbances that
-/// are decoupled only while they are constant.
+/// Warns of faults that no test tells apart, of parameters whose worst values are inside their limits, and of
+/// disturbances that are decoupled only while they are constant.
 fn warn(tests: &[Test], confused: &[Vec<String>], warnings: &mut Vec<String>) {
     for group in confused {
         warnings.push(format!(
@@ -371,7 +371,7 @@ fn warn(tests: &[Test], confused: &[Vec<String>], warnings: &mut Vec<String>) {
     }
 }
 
-/// Warns of faults whose stated size errors of the model may hide.
+/// Warns of faults that model errors may hide at their stated size.
 fn warn_of_hidden(tests: &[Test], faults: &[DetectedFault], warnings: &mut Vec<String>) {
     for fault in faults.iter().filter(|fault| fault.delay.is_none()) {
         let hides = |test: &&Test| test.name == fault.test && test.model_error > 0.0;

@@ -66,7 +66,7 @@ pub(crate) fn report(
     }))
 }
 
-/// The fall-back, case by case.
+/// What the cases of the fall-back are examined with.
 struct Examination<'a> {
     cases: Cases<'a>,
     gains: Gains,
@@ -110,8 +110,7 @@ impl Examination<'_> {
     }
 
     /// Returns margins, and the delay margin in s, while an actuator has failed. An actuator that is gone is no input
-    /// of the loop: the plant has no column for it and the controller no command, although the observer goes on with
-    /// it.
+    /// of the loop: the plant has no column and the controller no command for it, although the observer still has it.
     fn margins(&self, failed: Option<usize>) -> Result<(Vec<LoopPoint>, f64), Error> {
         let Cases { designed, request } = self.cases;
         let LinearPlant { actuators, measurements, .. } = &designed.linear;
@@ -183,8 +182,8 @@ fn noise(designed: &Solution, whole: &DMatrix<f64>) -> Result<Vec<f64>, Error> {
     Ok(energy(&system)?.peaks)
 }
 
-/// Returns the reasons of the verdict by the fall-back; `limit`: the peak of S above which a design is red and its
-/// fall-back amber.
+/// Returns the reasons that the fall-back adds to the verdict; `limit`: the peak of S above which a design is red and
+/// its fall-back amber.
 pub(crate) fn reasons(report: &FallbackReport, limit: f64) -> Vec<(Level, String)> {
     let mut reasons = Vec::new();
     let mut amber = |text: String| reasons.push((Level::Amber, text + " (amber)"));

@@ -1,5 +1,4 @@
-//! Losses of effectiveness up to the fractions that the plant file states: what is proven, and what
-//! constant losses make unstable.
+//! Losses of effectiveness up to stated fractions: proofs of stability, and the limits of constant losses.
 
 use control::aso::{FaultyPlant, Gains};
 use control::controller::controller;
@@ -73,14 +72,14 @@ fn number(name: &str, value: f64) -> Number {
     Number { name: name.to_owned(), unit: None, value }
 }
 
-/// Returns the reasons of the verdict by the losses.
+/// Returns the reasons that the losses add to the verdict.
 pub(crate) fn reasons(report: &LossReport) -> Vec<(Level, String)> {
     report.loops.iter().filter_map(|lossy| reason(lossy, &report.stated)).collect()
 }
 
-/// Returns the reason of the verdict by a loop: red if constant losses within the stated range make it unstable, amber
-/// if nothing is proven. With the compensation off, which may never happen, instability is amber and a missing proof no
-/// reason.
+/// Returns the reason that a loop adds to the verdict: red if constant losses within the stated range make it unstable,
+/// amber if nothing is proven. With the compensation off, which may never happen, instability is amber and a missing
+/// proof no reason.
 fn reason(report: &LossLoop, stated: &[Number]) -> Option<(Level, String)> {
     let on = report.name == ON;
     let limit = &report.constant[0];
@@ -183,7 +182,7 @@ impl Examination<'_> {
         self.stated.iter().map(|loss| loss.up_to).collect()
     }
 
-    /// Returns the largest losses of all actuators together; with several actuators, then also those of each alone.
+    /// Returns the stated losses of all actuators together; with several actuators, also those of each alone.
     fn boxes(&self) -> Vec<Vec<f64>> {
         let all = self.largest();
         let alone = |at: usize| {
@@ -197,7 +196,7 @@ impl Examination<'_> {
         self.lossy.intact.nrows() > LARGEST_ORDER
     }
 
-    /// Returns why no proof is searched; None if one is.
+    /// Returns why no proof is searched; None if nothing prevents the search.
     fn obstacle(&self, constant: &ConstantLoss) -> Option<String> {
         if !constant.stable && constant.factor <= 1.0 {
             let losses = described(&constant.losses);
@@ -212,15 +211,15 @@ impl Examination<'_> {
         })
     }
 
-    /// Returns the first constant losses with which the loop becomes unstable, on rays within the multiples of the box
-    /// `largest` up to a loss of 1; if none does, the tested losses nearest to instability.
+    /// Returns the first constant losses that make the loop unstable, on rays within multiples of the box `largest` up
+    /// to a loss of 1; if none do, the tested losses nearest to instability.
     fn constant(&self, largest: &[f64]) -> Result<ConstantLoss, Error> {
         let most = 1.0 / largest.iter().copied().fold(0.0, f64::max);
         let limit = self.lossy.constant_limit(largest, most)?;
         let losses = self.stated.iter().zip(&limit.loss);
         let losses = losses.map(|(stated, loss)| number(&stated.name, *loss));
         Ok(ConstantLoss {
-            // A loop that is unstable without a loss is so from 0 on.
+            // The losses of 0 are the limit of a loop that is unstable without losses.
             losses: losses.filter(|loss| loss.value > 0.0 || limit.factor <= 0.0).collect(),
             stable: limit.factor >= most,
             factor: limit.factor,
@@ -353,8 +352,8 @@ mod tests {
     use crate::solve::designed::design;
     use crate::tests::read;
 
-    /// The fault `bias` is one of u2, which enters y2 by D. With integrals the filter is a part of the controller, in
-    /// which no column of the plant has the effect on y2.
+    /// The fault `bias` of u2 enters y2 by D. With integrals the filter is a part of the controller, so that no column
+    /// of the plant has the effect on y2.
     #[test]
     fn a_fault_of_an_actuator_that_enters_a_measurement_has_no_bound_beside_integrals() {
         let names = |integral: bool| {

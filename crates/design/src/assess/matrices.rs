@@ -121,8 +121,8 @@ pub(crate) fn names(signals: &[Signal]) -> Vec<String> {
     signals.iter().map(|signal| signal.name.clone()).collect()
 }
 
-/// Returns four matrices with the rows and columns of A, B, C and D of the plant without its delays; the last one only
-/// if D is not 0.
+/// Names the rows and columns of four matrices shaped as A, B, C and D of the plant without its delays; the last matrix
+/// is left out if D is 0.
 pub(crate) fn of_plant(
     linear: &LinearPlant,
     meaning: &str,

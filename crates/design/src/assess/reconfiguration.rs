@@ -3,7 +3,7 @@
 use crate::report::reconfiguration::{ReconfigurationReport, Reconfigured};
 use crate::report::robustness::Level;
 
-/// Returns the reasons of the verdict by actuators that are gone; none where a fall-back gives a stable loop.
+/// Returns the reasons that actuators which are gone add to the verdict; none where a fall-back gives a stable loop.
 pub(crate) fn reasons(report: &ReconfigurationReport) -> Vec<(Level, String)> {
     let single = report.without.iter().map(|case| (vec![case.actuator.clone()], &case.outcome));
     let several = report.several.iter().map(|case| (case.actuators.clone(), &case.outcome));

@@ -42,11 +42,11 @@ pub(crate) fn remedies(
             Some(Reason { text, aim: Aim::Peak(at) })
         })
         .collect();
-    // Other parameters of an FMU are not tried.
+    // For parameters of an FMU there is no remedy.
     if robustness.tolerance.is_unstable() && limits.parameters.is_empty() {
         reasons.push(Reason { text: instability(&robustness.tolerance), aim: Aim::Stable });
     }
-    // The search for other gains takes long.
+    // Such gains take long to compute.
     let searched = [&file.feedback, &file.observer].iter().any(|request| {
         matches!(request.requirement, Requirement::Region(_) | Requirement::HInfinity { .. })
     });
@@ -88,7 +88,7 @@ enum Aim {
     Stable,
 }
 
-/// The loop of the plant file.
+/// The loop with the present requirements.
 struct Present {
     peaks: Vec<f64>,
     is_unstable: bool,
@@ -135,8 +135,8 @@ fn variants(file: &PlantFile<'_>) -> Vec<Variant> {
     FACTORS.into_iter().flat_map(with_factor).collect()
 }
 
-/// Returns the requirement of the loop `name` with eigenvalues or bandwidth times `factor`, or with another `weight`;
-/// None for other requirements.
+/// Returns the requirement of the loop `name` with eigenvalues or bandwidth times `factor`, or with a scaled weight,
+/// named `weight`; None for other requirements.
 fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> Option<Scaled> {
     // The remedy states the requirement with these digits.
     let short = |value: f64| rounded(value).parse::<f64>().unwrap_or(value);

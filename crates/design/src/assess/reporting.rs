@@ -53,7 +53,7 @@ use plant_file::{PlantFile, estimator};
 /// A design with all that its report is about.
 pub(crate) struct Assessment<'a> {
     pub(crate) file: &'a PlantFile<'a>,
-    /// The plants whose parameters vary; without them the entries of the matrices vary.
+    /// The FMU whose parameters vary; None if the entries of the matrices vary.
     pub(crate) parameters: Option<&'a ParameterFamily<'a>>,
     pub(crate) designed: &'a Designed,
     /// A description of the controller, in a sentence.
@@ -305,7 +305,7 @@ fn closed(
     })
 }
 
-/// Returns the largest stable loss of effectiveness of each actuator that has a fault of this kind.
+/// Returns the largest stable loss of effectiveness of each actuator that has such a fault.
 pub(crate) fn effectiveness(designed: &Solution) -> Result<Vec<Effectiveness>, Error> {
     let lossy = |model: &control::faults::Fault| match model.entry {
         FaultEntry::LossOfEffectiveness(input) => Some(input),

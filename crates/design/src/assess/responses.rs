@@ -12,8 +12,8 @@ use crate::solve::solution::Solution;
 use control::blocks::{beside, stacked};
 use plant_file::faults::Fault;
 
-/// Relative band of the settling time: a response has settled when it stays within this fraction of
-/// its largest distance.
+/// Relative band of the settling time: a response has settled when its distance from the final value stays within this
+/// fraction of the largest one.
 pub(crate) const SETTLED: f64 = 0.02;
 /// Number of parts of a sample time, between which points are shown besides the samples.
 pub(crate) const PARTS: u32 = 5;
@@ -76,7 +76,7 @@ fn part(fault: &Fault) -> Number {
     Number { name: fault.name.clone(), unit: fault.unit.clone(), value: size(fault) }
 }
 
-/// The loop from the faults to all that the responses show.
+/// The loop from the faults to the signals of the responses.
 struct ShownLoop<'a> {
     designed: &'a Solution,
     outputs: Vec<Output>,

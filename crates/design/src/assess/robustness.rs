@@ -46,8 +46,8 @@ pub(crate) fn loop_of(designed: &Solution) -> Result<Loop, Error> {
 }
 
 /// Returns the robustness of a design, None if the loop is not stable, and the time for certificates, whose clock
-/// starts with the proof for the tolerances. `family`: the plants whose parameters vary; without it the entries
-/// of the matrices vary.
+/// starts with the proof for the tolerances. `family`: the FMU whose parameters vary; None if the entries of the
+/// matrices vary.
 pub(crate) fn robustness(
     designed: &Solution,
     limits: &RobustnessLimits,
@@ -98,7 +98,7 @@ pub(crate) fn robustness(
     Ok((Some(robustness), budget))
 }
 
-/// The margins of a loop, and what the noise of the measurements does in it.
+/// The margins of a loop, and the effect of measurement noise in it.
 pub(crate) struct Margins {
     pub(crate) points: Vec<LoopPoint>,
     /// Delay margin and longest hold, s; the latter is NaN for a plant that is known in its samples only.

@@ -112,7 +112,7 @@ fn without_fmu(table: &mut Table, designed: &Solution) -> bool {
     }
 }
 
-/// States the operating point of each signal under `key`, which the FMU gave: a name becomes a table.
+/// States the operating point that the FMU gave for each signal under `key`: a name becomes a table.
 fn state_operating_point(table: &mut Table, key: &str, signals: &[Signal]) {
     let Some(Value::Array(entries)) = table.get_mut(key) else { return };
     for (entry, signal) in entries.iter_mut().zip(signals) {

@@ -51,7 +51,7 @@ impl<'a> Decoupling<'a> {
         self.inputs.iter().any(|(decoupled, _)| *decoupled == input)
     }
 
-    /// Returns for each fault the length of the steady mean of the residuals after a step by its size; an error names a
+    /// Returns for each fault the norm of the steady mean of the residuals after a step by its size; an error names a
     /// fault whose steady mean is negligible.
     pub(super) fn shifts(&self, file: &PlantFile<'_>) -> Result<Vec<f64>, crate::Error> {
         let place = |fault: usize| &file.faults[fault].place;
@@ -74,7 +74,7 @@ impl<'a> Decoupling<'a> {
     }
 
     /// Returns the filter for `fault`: like this one, but it also decouples each of `others` (exactly, else as a random
-    /// walk) unless that leaves no trace of `fault`. `shift`: the length of the steady mean of `fault` in this filter.
+    /// walk) unless that leaves no trace of `fault`. `shift`: the norm of the steady mean of `fault` in this filter.
     pub(super) fn isolating(
         &self,
         fault: usize,

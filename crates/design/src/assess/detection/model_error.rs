@@ -27,7 +27,7 @@ type Case = Rc<(UncertainPlant, DVector<f64>)>;
 /// A bound of the means of residuals that errors of the model cause.
 #[derive(Clone, Copy)]
 pub(super) struct LargestMean {
-    /// As a length in standard deviations, times the stated factor, [`ModelError::margin`].
+    /// As a norm in standard deviations, times the stated factor, [`ModelError::margin`].
     pub(super) mean: f64,
     /// For parameters of an FMU: relative excess of the largest mean in the interior over that at the corners.
     pub(super) interior_excess: Option<f64>,
@@ -97,9 +97,8 @@ impl<'a> ModelErrors<'a> {
         })
     }
 
-    /// Returns the largest mean of combinations of residuals, as a length in standard deviations, times the factor of
-    /// the plant file: a bound for all plants whose entries are within their tolerances; for parameters of an FMU the
-    /// largest bound of the plants that were tried at the corners and within.
+    /// Returns the largest mean of combinations of residuals: a bound for all plants whose entries are within their
+    /// tolerances; for parameters of an FMU the largest bound of the plants that were tried, at the corners and inside.
     pub(super) fn largest_mean(
         &self,
         decoupling: &Decoupling<'_>,
@@ -158,7 +157,7 @@ impl<'a> ModelErrors<'a> {
         Ok((UncertainPlant { nominal: plant, sizes }, self.bounds.clone().push(1.0)))
     }
 
-    /// Returns the length of the bounds of combinations of residuals for a plant whose inputs have these `bounds`.
+    /// Returns the norm of the bounds of combinations of residuals for a plant whose inputs are within `bounds`.
     fn bound_of(
         &self,
         plant: &UncertainPlant,
@@ -189,7 +188,7 @@ impl<'a> ModelErrors<'a> {
     }
 }
 
-/// Returns the linear plant without D, with the sizes of the errors of its entries by the tolerances.
+/// Returns the linear plant without D, with the largest errors of its entries within the tolerances.
 fn uncertain(linear: &LinearPlant, file: &PlantFile<'_>) -> UncertainPlant {
     let mut nominal = linear.state_space();
     let Tolerances { of: [a, b, c, _], .. } =

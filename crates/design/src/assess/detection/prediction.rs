@@ -44,7 +44,7 @@ impl TestKind {
     }
 
     /// Returns a lower bound of the mean number of samples between false alarms while the mean of the residuals without
-    /// faults has at most the length `bias`.
+    /// faults has at most the norm `bias`.
     pub(super) fn between_false_alarms(&self, bias: f64) -> f64 {
         match self {
             Self::Cusum(test) => test.between_false_alarms_with_bias(bias),

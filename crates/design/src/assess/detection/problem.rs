@@ -11,7 +11,7 @@ use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::detection::DetectionRequest;
 
-/// A filter counts as fast enough from this part of the decay rate that it should have.
+/// A filter counts as fast enough if it has this part of the required decay rate.
 const NEARLY: f64 = 0.99;
 
 /// The plant of the residuals, in the time domain of the controller.

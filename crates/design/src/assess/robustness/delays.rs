@@ -40,7 +40,7 @@ pub(super) fn exact(
     }))
 }
 
-/// Returns the reasons of the verdict by exact delays; none without delays.
+/// Returns the reasons that exact delays add to the verdict; none without delays.
 pub(crate) fn reasons(robustness: &Robustness) -> Vec<(Level, String)> {
     let Some(delays) = &robustness.delays else { return Vec::new() };
     let order = delays.judged_order;

@@ -1,4 +1,4 @@
-//! What the noise of the measurements does in a loop.
+//! The effect of measurement noise in a loop.
 
 use control::robustness::{Loop, noise_gains};
 use control::{Domain, Error, StateSpace};
