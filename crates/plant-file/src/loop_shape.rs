@@ -30,7 +30,7 @@ const PER_SAMPLE: f64 = 0.5;
 pub struct LoopShape {
     /// |S| is below w / `bandwidth` at low frequencies w, both in rad/s.
     pub bandwidth: f64,
-    /// The relative distance of a measurement from its integrated reference is below w / `set_point` at low
+    /// The relative control error of a measurement with an integrated reference is below w / `set_point` at low
     /// frequencies w, both in rad/s.
     pub set_point: f64,
     /// |S| and |T| are below `peak` at every frequency.

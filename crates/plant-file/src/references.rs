@@ -21,7 +21,7 @@ pub struct References {
     pub steps: Vec<Option<f64>>,
     /// Where each reference is stated.
     pub places: Vec<Place>,
-    /// Whether the distance from the references is integrated; otherwise they act by the feedforward only.
+    /// Whether the control errors are integrated; otherwise the references act by the feedforward only.
     pub integral: bool,
     /// Whether the references act on the commands by a constant gain.
     pub feedforward: bool,

@@ -33,7 +33,7 @@ pub enum Requirement {
     HInfinity {
         /// The largest norm; `None` for the least one.
         bound: Option<f64>,
-        /// The region of the eigenvalues; without parts if none is stated.
+        /// The region of the eigenvalues; all stable eigenvalues if none is stated.
         region: Region,
         /// The weights of the outputs of the norm and of the measurement noise.
         channel: Channel,
@@ -72,7 +72,7 @@ pub struct Request {
 }
 
 impl Request {
-    /// A request for a bandwidth that is yet to be chosen, for a file that states none; `place`: that of the file.
+    /// A request for a bandwidth that is yet to be chosen, as the file states no requirement; `place`: of the file.
     #[must_use]
     pub fn open(place: Place) -> Self {
         let requirement = Requirement::Bandwidth(Bandwidth { rate: None, is_stated: false });

@@ -50,7 +50,7 @@ const AMBER: f64 = 2.0;
 const RED: f64 = 4.0;
 
 impl RobustnessLimits {
-    /// Reads the table, or returns the defaults for a plant with that many measurements.
+    /// Reads the table, or returns the defaults for a plant with this number of `measurements`.
     pub(crate) fn read(file: &Table<'_>, model: &Model, measurements: usize) -> Result<Self> {
         // A single entry of a sampled A has no physical meaning, and hence no relative tolerance.
         let of_a = if model.only_samples().is_some() { 0.0 } else { TOLERANCE };

@@ -101,7 +101,7 @@ impl PlantFile<'_> {
     }
 }
 
-/// Reads `[[family]]`, plants with names that differ; empty without it.
+/// Reads `[[family]]`, plants with different names; empty without it.
 pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>> {
     let Some(entry) = file.get("family") else { return Ok(Vec::new()) };
     let message = "expected `family` (one gain) or `schedule` (gains by a variable)";
