@@ -9,7 +9,7 @@ use crate::{Design, Error};
 impl Design {
     /// Writes the controller of a sampled design as source code.
     ///
-    /// In double precision its results have the bits of the controller FMU of this design.
+    /// In double precision its results equal those of the controller FMU of this design, bit by bit.
     ///
     /// # Errors
     ///

@@ -229,8 +229,8 @@ impl Solution {
         all
     }
 
-    /// Returns the experiment of the plant file. The default covers ten time constants of the
-    /// slowest feedback eigenvalue in 2000 steps, or in steps that are stated or of the sample time, at least ten.
+    /// Returns the default experiment. Unless it is stated, the stop time is ten time constants of the slowest feedback
+    /// eigenvalue, at least ten steps; the step is the sample time or, in continuous time, a 2000th of the stop time.
     fn experiment(&self, file: &PlantFile<'_>) -> Result<Defaults, crate::Error> {
         let slowest = self.slowest_rate()?;
         let sample_time = file.sampling.map(|sampling| sampling.period);

@@ -1,4 +1,4 @@
-//! The controller without observer, for the estimates of the Kalman filter that carries the plant's FMU.
+//! The controller without observer, for the estimates of the Kalman filter that contains the plant's FMU.
 
 use aso_controller::design::{Estimator, Measurement, Signal};
 use aso_controller::{Design, Matrix, channel};

@@ -210,7 +210,7 @@ impl Design {
         DesignedFmu::new(base, &content)
     }
 
-    /// Makes the FMU of an extended or unscented Kalman filter, for the noise of the designed observer, that carries
+    /// Makes the FMU of an extended or unscented Kalman filter, for the noise of the designed observer, that contains
     /// the plant's FMU; from the packed one at `base`.
     ///
     /// # Errors

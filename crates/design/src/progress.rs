@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Progress {
-    /// The name of what is computed from now on.
+    /// The name of the step.
     pub step: &'static str,
     /// The part of the work that is done, from 0 to below 1, estimated for a large plant.
     pub done: f64,

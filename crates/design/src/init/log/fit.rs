@@ -11,7 +11,7 @@ use crate::init::log::read::Log;
 /// A horizon, in samples, over which even an unstable plant can be predicted.
 pub(super) const SHORT: usize = 20;
 
-/// The logarithm of the growth of an error over a simulation, from which on the simulation is not used.
+/// Logarithm of the growth of an error over a simulation above which the simulation is not used.
 const GROWTH: f64 = 1.0;
 
 /// A variance below this part of the mean square of the samples is rounding.

@@ -56,7 +56,7 @@ pub(super) fn logs(paths: &[PathBuf], options: &LogOptions) -> Result<Vec<Log>, 
             }
             let conflict = first.signals().zip(log.signals()).find_map(|(signal, other)| {
                 let (expected, unit) = (signal.unit.as_ref()?, other.unit.as_ref()?);
-                // A unit that FMI does not know has no other notation.
+                // Units that FMI does not know are compared as texts.
                 let are_known = [unit, expected].iter().all(|unit| Unit::parse(unit).is_ok());
                 let is_same = unit == expected || (are_known && is_one_unit(unit, expected));
                 (!is_same).then_some((&signal.name, expected, unit))
@@ -217,7 +217,7 @@ impl Columns<'_> {
     }
 }
 
-/// Returns the length in s of a unit, also of a second by another name, and 1 for `-`; None if it is no unit of time.
+/// Returns the length in s of a unit, 1 for other names of the second and for `-`; None if it is no unit of time.
 fn seconds(unit: &str) -> Option<f64> {
     if ["sec", "secs", "second", "seconds", "-"].contains(&unit.to_lowercase().as_str()) {
         return Some(1.0);
