@@ -63,7 +63,7 @@ pub struct Fault {
     pub place: Place,
 }
 
-/// The entries that state faults; an error about all faults is at the first one in the file.
+/// The entries that state faults; an error about all faults is at the first of these that the file has.
 pub const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
 
 /// Largest number of faults with `up_to`.
