@@ -144,9 +144,9 @@ pub struct Matrix {
 /// u = N_r r - K y_f + K_i integral of (r - y) dt - K_d y_f' - K_2 y_f'' - ...
 /// ```
 ///
-/// in deviations from the operating point; `y_f`, `y_f`' are the filtered measurement and its rate: 1 / (1 + s / w) of
-/// a PI controller, 1 / (1 + sqrt(2) s / w + s^2 / w^2) of a PID controller, a Butterworth filter of order n of a
-/// controller of order n.
+/// in deviations from the operating point; `y_f`, `y_f`' are the filtered measurement and its rate. The filter is 1 /
+/// (1 + s / w) in a PI controller, 1 / (1 + sqrt(2) s / w + s^2 / w^2) in a PID controller, and a Butterworth filter of
+/// order n in a controller of order n.
 #[derive(Clone, Serialize, JsonSchema)]
 pub struct PidController {
     /// The name of the command.
@@ -328,7 +328,7 @@ pub struct Sampled {
 /// Theorem 1 and related certificates.
 #[derive(Serialize, JsonSchema)]
 pub struct Certificate {
-    /// Theorem 1 as printed, or the reason why it does not hold.
+    /// Theorem 1 as printed by Patton and Klinkhieo (2009), or the reason why it does not hold.
     #[serde(serialize_with = "or_reason")]
     #[schemars(with = "OrReason<Theorem1>")]
     pub printed: Result<Theorem1, String>,

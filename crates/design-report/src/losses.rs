@@ -10,7 +10,7 @@ use crate::{OrReason, or_reason};
 /// The proofs about losses of effectiveness up to the fractions that the plant file states.
 #[derive(Serialize, JsonSchema)]
 pub struct LossReport {
-    /// The actuators with `up_to` and this fraction.
+    /// The stated fraction `up_to` of each actuator that may lose effectiveness.
     pub stated: Vec<Number>,
     /// Each loop that the controller can close.
     pub loops: Vec<LossLoop>,

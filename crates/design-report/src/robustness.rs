@@ -126,7 +126,7 @@ pub struct ExactDelays {
     /// The largest spectral radius of K (G - H) S over the frequencies, with the controller K, the plant G with exact
     /// delays and the plant H with approximated ones. Below 1 the loop is stable with exact delays.
     pub difference: f64,
-    /// Its frequency, rad/s.
+    /// The frequency of `difference`, rad/s.
     pub frequency: f64,
     /// Number of frequencies that were examined.
     pub frequencies: u32,
@@ -178,7 +178,7 @@ pub struct Disk {
     pub alpha: f64,
     /// The size for which stability is certain.
     pub certified: f64,
-    /// Its frequency, rad/s.
+    /// The frequency that determines `alpha`, rad/s.
     #[schemars(with = "Option<f64>")]
     pub frequency: f64,
     /// Gain factors within the disk.
@@ -224,9 +224,9 @@ pub struct Number {
 pub struct Compared {
     /// What is compared.
     pub name: String,
-    /// Of the design.
+    /// The number of the design.
     pub design: f64,
-    /// Of the linear-quadratic design, if there is one.
+    /// The number of the linear-quadratic design, if there is one.
     pub linear_quadratic: Option<f64>,
 }
 
