@@ -11,7 +11,7 @@ use crate::signals::{Signal, name, position};
 /// The requirements on the detection of faults.
 #[derive(Clone, Debug)]
 pub struct DetectionRequest {
-    /// Where the file states it.
+    /// Its place in the file.
     pub place: Place,
     /// The test of the residuals.
     pub method: Method,
@@ -55,7 +55,7 @@ pub struct ModelError {
     pub margin: f64,
     /// For each command the largest deviation from its operating point, if stated.
     pub commands: Vec<Option<f64>>,
-    /// Where the file states it.
+    /// Its place in the file.
     pub place: Place,
 }
 
@@ -66,7 +66,7 @@ pub struct ProcessNoise {
     pub values: Vec<f64>,
     /// Whether the file states a list, which has one number for each state.
     pub is_list: bool,
-    /// Where the file states it.
+    /// Its place in the file.
     pub place: Place,
 }
 
@@ -79,7 +79,7 @@ pub struct Disturbance {
     pub entry_point: DisturbanceEntry,
     /// Largest absolute value, if stated.
     pub bound: Option<f64>,
-    /// Where the file states it.
+    /// Its place in the file.
     pub place: Place,
 }
 

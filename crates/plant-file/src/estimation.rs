@@ -39,7 +39,7 @@ pub enum Law {
 pub struct EstimationRequest {
     /// The law.
     pub law: Law,
-    /// Where the file states it.
+    /// Its place in the file.
     pub place: Place,
 }
 

@@ -14,7 +14,7 @@ pub struct FallbackRequest {
     pub loss: f64,
     /// The region of the eigenvalues in all cases; `None` if the file states none.
     pub region: Option<Region>,
-    /// Where the file states it.
+    /// Its place in the file.
     pub place: Place,
 }
 

@@ -59,7 +59,7 @@ pub struct Fault {
     pub step: Option<f64>,
     /// The largest fraction of a loss of effectiveness for which the loop must be stable, if stated.
     pub up_to: Option<f64>,
-    /// Where the file states it.
+    /// Its place in the file.
     pub place: Place,
 }
 

@@ -41,7 +41,7 @@ pub struct LoopShape {
     pub effort: Option<f64>,
     /// PI, PID or other controllers of low order in place of the state feedback, if they are stated.
     pub pid: Option<Pid>,
-    /// Where the file states it.
+    /// Its place in the file.
     pub place: Place,
 }
 

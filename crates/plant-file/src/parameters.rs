@@ -12,7 +12,7 @@ pub struct ParameterTolerance {
     pub name: String,
     /// How far it varies.
     pub tolerance: Tolerance,
-    /// Where the plant file states it.
+    /// Its place in the plant file.
     pub place: Range<usize>,
 }
 

@@ -19,7 +19,7 @@ pub struct ReconfigurationRequest {
     /// Loss and time in s: an actuator counts as gone after its estimated loss has been above this loss for this time;
     /// `None` if only an input of the FMU reports it.
     pub decision: Option<(f64, f64)>,
-    /// Where the file states it.
+    /// Its place in the file.
     pub place: Place,
 }
 

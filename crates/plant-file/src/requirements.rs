@@ -65,7 +65,7 @@ pub struct Region {
 pub struct Request {
     /// What is required.
     pub requirement: Requirement,
-    /// Where the file states it.
+    /// Its place in the file.
     pub place: Place,
     /// Name and place of the second weight, R or V; none for other requirements.
     pub other: Option<(String, Place)>,

@@ -21,7 +21,7 @@ const POINT: &str = "operating_point";
 pub struct Variant {
     /// Its name.
     pub name: String,
-    /// Where the file states it.
+    /// Its place in the file.
     pub place: Place,
     model: Model,
     /// `u_op` and `y_op`, if stated.
