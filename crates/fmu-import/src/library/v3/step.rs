@@ -3,7 +3,7 @@
 
 use super::super::calls::function;
 use super::Component;
-use super::{InputElement, ORDERS};
+use super::{InputElement, Inputs, ORDERS};
 use slave::{CallError, EventInfo, Failure, absent};
 
 const SET: &str = "fmi3SetFloat64";
@@ -99,7 +99,7 @@ impl Component {
 
     /// Forgets the inputs that have had derivatives, whose sizes may have changed.
     pub(crate) fn forget_inputs(&mut self) {
-        self.inputs = Box::default();
+        *self.inputs = Inputs::default();
     }
 
     pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
