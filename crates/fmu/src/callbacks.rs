@@ -36,7 +36,7 @@ impl Callbacks {
     /// Whether the importer receives a message with this status whatever its logging settings are.
     ///
     /// FMI 3.0.2 demands both that `fmi3Error` and a failed instantiation are explained, and that nothing is logged
-    /// while `loggingOn` is false (section 2.3.1). In its next release errors are logged.
+    /// while `loggingOn` is false (section 2.3.1). In the next release of FMI 3.0, errors are logged.
     pub(crate) fn needs(&self, status: Status) -> bool {
         matches!(self, Self::Version3 { .. }) && matches!(status, Status::Error | Status::Fatal)
     }
@@ -101,7 +101,7 @@ impl IntermediateUpdate {
         Self { environment: std::ptr::null_mut(), function: nothing }
     }
 
-    /// Calls the callback for the inputs at `time` in s; the importer can neither read outputs nor return early.
+    /// Asks the importer to set the inputs of `time` in s; it can neither read outputs nor end the step early.
     pub(crate) fn ask(self, time: f64) {
         let (mut return_requested, mut return_time) = (0, time);
         let (request, result) = (&raw mut return_requested, &raw mut return_time);

@@ -46,7 +46,7 @@ thread_local! {
 }
 
 impl Fence {
-    /// Replaces the last panic, and returns the one before.
+    /// Sets the last panic, and returns the previous one.
     fn replace(&self, panic: Option<Panic>) -> Option<Panic> {
         ManuallyDrop::into_inner(self.last.replace(ManuallyDrop::new(panic)))
     }
@@ -54,7 +54,7 @@ impl Fence {
     #[cold]
     fn failure(&self, payload: &dyn Any) -> Failure {
         let text = text(payload);
-        // `resume_unwind` does not call the hook, so the last panic may be one that the model caught.
+        // A panic by `resume_unwind` does not call the hook; then `last` may be a panic that the model caught before.
         Failure::Fatal(match self.replace(None).filter(|last| last.text == text) {
             Some(Panic { place, .. }) => format!("the model panicked at {place}: {text}"),
             None => format!("the model panicked: {text}"),

@@ -30,9 +30,9 @@ use fmu_description::ModelDescription;
 use fmu_description::call_order::InterfaceType;
 use fmu_description::location::{NO_FOLDER, path_from_uri};
 
-/// Lets the importer set the inputs within the step that `fmi3DoStep` will make, if it has asked for that
-/// ([`Instance::begin_intermediate`]). During the callbacks no call is in progress, so that the importer
-/// can set inputs.
+/// Asks the importer to set the inputs at the middle and the end of the coming step of `fmi3DoStep`, if it uses
+/// intermediate update ([`Instance::begin_intermediate`]). During the callbacks `busy` is false, so that the
+/// importer can set inputs.
 unsafe fn ask_for_inputs<M: Model>(component: fmi2Component, start: f64, size: f64) {
     // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
     let Some(component) = (unsafe { component.cast::<Component<M>>().as_ref() }) else { return };
@@ -134,7 +134,7 @@ unsafe fn snapshot<'a, M: Model>(state: fmi2FMUstate) -> Result<&'a Snapshot<M>,
     unsafe { state.cast::<Snapshot<M>>().as_ref() }.ok_or_else(|| null_pointer("FMUstate"))
 }
 
-/// Writes a snapshot to the FMU state in `place`, or makes one if it is null.
+/// Overwrites the snapshot to which the FMU state in `place` points; allocates one if it is null.
 unsafe fn store<M: Model>(place: &mut fmi2FMUstate, snapshot: Snapshot<M>) {
     // SAFETY: a state that is not null is a snapshot that this library made.
     if let Some(old) = unsafe { place.cast::<Snapshot<M>>().as_mut() } {
@@ -244,7 +244,7 @@ pub unsafe fn instantiate<M: Model>(
     into_component("fmi2Instantiate", instance, &callbacks)
 }
 
-/// Hands an instance over to the importer, or logs why `function` made none and returns null.
+/// Passes an instance to the importer, or logs why `function` failed and returns null.
 fn into_component<M: Model>(
     function: &str,
     instance: Result<Instance<M>, Failure>,
@@ -294,7 +294,7 @@ fn render(description: &ModelDescription) -> Result<String, Failure> {
     Err(Failure::Error(format!("the model's variables break rules: {}", list.join("; "))))
 }
 
-/// Passes the model description that `make` makes, or an error message, to `sink`. Returns 0 for a description and 1
+/// Passes the model description that `make` returns, or an error message, to `sink`. Returns 0 for a description and 1
 /// for an error.
 unsafe fn pass_description(
     resources: *const c_char,

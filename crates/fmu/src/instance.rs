@@ -47,7 +47,7 @@ pub(crate) struct Core<M: Model> {
     unchecked: bool,
     /// Whether an input derivative is set for the next step.
     sloped: bool,
-    /// The time of the next event in s, as the last event stated it.
+    /// The time of the next event in s, if the last event stated it.
     next_event: Option<f64>,
     /// Model exchange: the earliest time in s to which the importer may go back, and the time of the last
     /// completed integrator step.
@@ -149,9 +149,9 @@ impl<M: Model> Instance<M> {
         Ok(instance.into_type(interface_type))
     }
 
-    /// Makes the model and its interface inside the panic fence. `session` checks the arguments of the importer and
-    /// makes the part of FMI 3.0; it runs inside the fence, too, because the model is dropped if it fails. Returns the
-    /// model description, too.
+    /// Makes the model and its interface inside the panic fence. Returns the instance with its model description.
+    /// `session` checks the importer's arguments and makes the part for FMI 3.0. It also runs inside the fence: if it
+    /// fails, the model is dropped, which may panic.
     fn build(
         make: impl FnOnce() -> Result<M, Failure>,
         callbacks: Callbacks,
@@ -160,7 +160,7 @@ impl<M: Model> Instance<M> {
             &mut ModelDescription,
         ) -> Result<Option<Box<Session>>, Failure>,
     ) -> Result<(Self, ModelDescription), Failure> {
-        // The guard outlives a panic of the model, during which it could not restore the hook.
+        // Outside of the fence: if a panic of the model dropped the guard, it could not restore the hook.
         let hook_guard = HookGuard::new();
         let (complete, description) = guarded(|| {
             let mut fresh = make()?;
@@ -304,7 +304,7 @@ impl<M: Model> Instance<M> {
         drop(hook_guard);
     }
 
-    /// Logs a message if its category is selected or its status needs an explanation.
+    /// Logs a message if its category is selected or its status must be explained ([`Callbacks::needs`]).
     fn log(&self, status: Status, category: &str, message: &str) {
         log(&self.callbacks, self.categories.as_deref(), status, category, message);
     }
@@ -314,8 +314,8 @@ impl<M: Model> Instance<M> {
         self.debug_logging = on;
     }
 
-    /// The categories of `fmi2SetDebugLogging`: only their messages are sent; all messages if `categories` is empty. An
-    /// error for an unknown category. Messages that explain a status are sent even if debug logging is off (section
+    /// `fmi2SetDebugLogging`: selects the categories whose messages are sent, all if `categories` is empty. An error
+    /// for an unknown category. Messages that explain a status are sent even if debug logging is off (section
     /// 2.1.3).
     pub(crate) fn set_debug_logging(&mut self, categories: Vec<String>) -> Result<(), Failure> {
         self.check_categories(&categories)?;
@@ -482,7 +482,7 @@ fn drop_inside_fence<T>(value: T) -> Result<(), Failure> {
     })
 }
 
-/// Logs a message if `selected` has its category or is `None`, or if its status needs an explanation.
+/// Logs a message if `selected` has its category or is `None`, or if its status must be explained.
 fn log(
     callbacks: &Callbacks,
     selected: Option<&[String]>,
@@ -502,7 +502,7 @@ fn time_tolerance(time: f64) -> f64 {
     1e-9 * time.abs().max(1.0)
 }
 
-/// Returns the step from the instance's `time` to `start + size`; an error if there is none.
+/// Returns the step from the instance's `time` to `start + size`; an error for an invalid `start` or `size`.
 ///
 /// If `start` differs from `time` only by rounding, the step has the given size, so that the model
 /// sees equal communication steps as equal.
@@ -530,7 +530,7 @@ fn communication_step(time: f64, start: f64, size: f64) -> Result<Step, Failure>
         Step { start: time, size: mismatch + size }
     };
     let ends_later = start + size > time && step.size > 0.0;
-    // A size above `rounding` is above the distance to the next number, too.
+    // A size above `rounding` is also above the distance from `start` to the next number.
     let is_resolved = size > rounding || size >= start.next_up() - start;
     if !(ends_later && is_resolved) {
         return Err(step_too_small(time, start, size));

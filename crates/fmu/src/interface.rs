@@ -65,7 +65,8 @@ type TypedReference = (Kind, u32);
 
 impl<M: Model> Interface<M> {
     /// Assigns slots and value references to the variables of `model` and makes the model description with start
-    /// values. It has the variables of every version of FMI; see [`Interface::restrict`] and [`Interface::convert`].
+    /// values. The description has the variables of both versions of FMI until [`Interface::restrict`] or
+    /// [`Interface::convert`].
     pub(crate) fn new(model: &mut M) -> Result<(Self, ModelDescription), Failure> {
         let (variables, fields) = split(model.variables());
         let mut description = general::general::<M>(model);
@@ -207,7 +208,7 @@ impl<M: Model> Interface<M> {
 }
 
 /// Splits the variables into their declarations and their fields. Variables that descriptions of FMI 2.0 leave out come
-/// last, then their aliases, so that the others keep their indices without them.
+/// last, followed by their aliases, so that leaving them out changes no index of another variable.
 fn split<M>(variables: Vec<Variable<M>>) -> (Vec<Declaration>, Vec<Fields<M>>) {
     let (last, first): (Vec<_>, Vec<_>) =
         variables.into_iter().partition(|variable| variable.declaration.is_left_out_of_2());
@@ -350,7 +351,7 @@ impl<M> Interface<M> {
         interface_type: InterfaceType,
     ) -> Result<(fmi3::Table, ModelDescription), Failure> {
         let indicators = self.event_indicators.unwrap_or_default();
-        // Before elements become arrays: only those with equal attributes do.
+        // Set before elements become arrays, because the elements of an array must have equal attributes.
         let mut scalars = description.clone();
         self.clocks.enter(&mut scalars)?;
         let interpolated = self.interpolated.iter().map(|&position| &self.reals[position].name);
@@ -381,7 +382,7 @@ impl<M> Interface<M> {
     }
 }
 
-/// Calls [`Model::new`]. If it fails and the importer named no folder, the message adds that.
+/// Calls [`Model::new`]. If it fails, the message adds if the importer named no folder.
 pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Failure> {
     M::new(resources).map_err(|failure| {
         if resources != std::path::Path::new(NO_FOLDER) {

@@ -68,16 +68,16 @@
 //!    description. Mistakes are errors of the compiler. A data-driven model, whose variables follow from
 //!    its `resources`, returns a table of [`Variable`]s from [`Model::variables`] instead.
 //! 4. **[`#[fmu::model]`](macro@model)** adds to the implementation of [`Model`] what follows from the
-//!    struct: name, start values, table. [`about!`] takes the rest from `Cargo.toml`. Every item can be
-//!    written instead.
+//!    struct: name, start values, table. [`about!`] takes the rest from `Cargo.toml`. An item that the
+//!    author writes takes precedence.
 //! 5. **[`Model::update`]** computes outputs and derivatives from states, inputs, parameters and time.
 //! 6. **[`Model::event_indicators`] and [`Model::event`]** (optional) state when an event happens and what
 //!    it changes.
 //! 7. **Both interfaces follow.** In model exchange the importer integrates the derivatives. In
-//!    co-simulation the exporter does, with located events. A model that advances in another way, such
-//!    as in closed form, implements [`Model::step`]; [`solver`] has the parts.
+//!    co-simulation this crate integrates them and locates the events. A model that advances in another
+//!    way, such as in closed form, implements [`Model::step`]; [`solver`] has the parts.
 //! 8. **[`Model::initialize`]** runs in initialization mode, whenever a value is read after another
-//!    value was set; [`Model::check`] before it.
+//!    value was set; [`Model::check`] runs before it.
 //! 9. **Directional derivatives** (optional): implement [`Model::differentiate`].
 //! 10. **Messages** (optional): a field of the type [`Log`] takes messages and warnings.
 //! 11. **Structural parameters** (optional, FMI 3.0): extents of arrays that the importer chooses; see

@@ -11,10 +11,10 @@ use fmu_description::ModelDescription;
 use fmu_description::abi::Status;
 use fmu_description::call_order::Function;
 
-/// An instance for co-simulation in the same program, where no library can be loaded.
+/// An instance for co-simulation in the same program, for platforms that cannot load a library.
 ///
-/// Each function is the one of FMI 2.0 with this name: the same checks, call order, panic fence and
-/// numbers as in the FMU. It returns the status of FMI; [`Linked::take_messages`] returns the reasons.
+/// Each function works as the FMI 2.0 function of the same name in the FMU: checks, call order, panic fence and
+/// numbers are the same. It returns the status of FMI; [`Linked::take_messages`] returns the reasons.
 pub struct Linked<M: Model> {
     instance: Instance<M>,
     description: ModelDescription,
@@ -22,7 +22,7 @@ pub struct Linked<M: Model> {
     saved: Vec<Option<Snapshot<M>>>,
 }
 
-/// Defines functions that call one of the instance.
+/// Defines functions that call a function of the instance by [`Instance::call`].
 macro_rules! calls {
     ($($(#[$doc:meta])* $name:ident = $function:ident($($argument:ident: $type:ty),*),
         $instance:ident => $body:expr;)*) => {

@@ -50,7 +50,7 @@ impl Log {
         self.add(None, text.into());
     }
 
-    /// Adds a message, unless it is there.
+    /// Adds a message, unless the log has the same one.
     fn add(&mut self, category: Option<&'static str>, text: String) {
         let message = Message { category, text };
         if self.messages.contains(&message) {

@@ -111,8 +111,8 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// follow their polynomials. A model without states needs no step either: only its events happen,
     /// and `update` runs at the end.
     ///
-    /// A step is at most as long as 1e7 steps of the default experiment, which are 1 s if it states none, and as 1e7
-    /// intervals of each periodic clock; the exporter discards a longer one.
+    /// The longest step is 1e7 times the step size of the default experiment (1 s if it states none), and at most 1e7
+    /// times the interval of each periodic clock; the exporter discards a longer one.
     ///
     /// # Errors
     ///
@@ -191,10 +191,10 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// `fmi2NewDiscreteStates`: handles an event at `time` (in s), that is, recomputes the variables that
     /// change at events only. Called at least once before the first continuous-time mode.
     ///
-    /// It may be called when nothing has happened, and several times at one time: importers do so, and the
-    /// default [`Model::step`]. So it decides from the values of the fields what to change. If there are clocked
-    /// variables ([`Variable::clocked_by`]), the exporter also calls it to read values while a clock ticks, and then
-    /// restores the model.
+    /// Importers and the default [`Model::step`] may call it when nothing has happened, and several times at one
+    /// time. So it must decide from the values of the fields what to change. If there are clocked variables
+    /// ([`Variable::clocked_by`]), the exporter also calls it to read values while a clock ticks, and then restores
+    /// the model.
     ///
     /// # Errors
     ///
@@ -213,8 +213,8 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
         let _ = time;
     }
 
-    /// Takes from `current`, the model of the instance, what a state that was read from bytes lacks: fields that are
-    /// not serialised because they follow from the files of the FMU. The default implementation does nothing.
+    /// Completes a state that was read from bytes: copies from `current`, the model of the instance, the fields that
+    /// are not serialised because they follow from the files of the FMU. The default implementation does nothing.
     fn complete(&mut self, current: &Self) {
         let _ = current;
     }

@@ -10,7 +10,7 @@ use crate::stepper::Stepper;
 /// Runs a model step by step, as its FMU does in co-simulation: for the unit tests of the model, and for
 /// programs in Rust that need no FMU.
 ///
-/// The fields of the struct are read and set directly. The page of the [crate] has an example.
+/// The program reads and sets the fields of the model directly. The page of the [crate] has an example.
 pub struct Simulation<M: Model> {
     model: M,
     interface: Interface<M>,

@@ -1,12 +1,12 @@
 //! Integration of ordinary differential equations with located events.
 //!
-//! The default implementation of [`Model::step`](crate::Model::step) uses this module, so an author
-//! needs it only for a step of another kind:
+//! The default [`Model::step`](crate::Model::step) uses this module; an author needs it for another step only:
 //!
 //! * [`Integrator`] integrates a [`System`] of any size with an adaptive step and stops at the first
 //!   state event.
 //! * [`Step`] is one step of the method, for arrays (`[f64; 4]`) and vectors.
-//! * [`Quartic`] estimates the first point at which a margin becomes negative; [`search`] and [`locate`] find it.
+//! * [`Quartic`] estimates the first point at which a margin, the distance to an event, becomes negative; [`search`]
+//!   and [`locate`] find it.
 //!
 //! Method: Dormand-Prince of order 5(4). It suits systems that are not stiff; an importer integrates a
 //! stiff model better by model exchange.

@@ -8,8 +8,8 @@ use fmu_description::DefaultExperiment;
 /// Most events in one communication step.
 const EVENT_LIMIT: u32 = 10_000;
 
-/// Most steps of the default experiment in one communication step. A model that samples or integrates with
-/// shorter steps of its own would not return from a much longer one.
+/// The longest communication step, divided by the step size of the default experiment. In a much longer one, a
+/// model that samples or integrates with shorter steps of its own would not return.
 const LONGEST: f64 = 1e7;
 
 /// Most calls of [`Model::event`] at one event.
@@ -62,9 +62,8 @@ impl Stepper {
         if size <= self.longest { Ok(()) } else { Err(too_long(size, self.longest)) }
     }
 
-    /// Checks that an event at `time` is at most as long after `next`, the time for which an event was announced, as a
-    /// communication step may be; both in s. A model that samples might not return from a later one. An error if it is
-    /// later.
+    /// Checks the delay from `next`, the announced time of an event, to `time`, at which it is handled, both in s. An
+    /// error if it exceeds the longest communication step: a model that samples might not return.
     pub(crate) fn check_delay(&self, next: f64, time: f64) -> Result<(), Failure> {
         if time - next <= self.longest {
             return Ok(());
@@ -175,7 +174,7 @@ impl Stepper {
             return shown.map(|()| Reached::End).map_err(|failure| stopped(failure, time));
         }
         equations.interface.read_states(equations.model, state);
-        // As an object: one copy of the integrator serves all models.
+        // A trait object, so that the integrator is compiled once for all models.
         let system: &mut dyn System = equations;
         let reached = integrator
             .start(system, time, state, target)

@@ -206,9 +206,8 @@ impl<M> Variable<M> {
     /// 2.2.8; `intervalVariability = constant`). The importer ticks it in event mode: the field is true in the
     /// next call of [`Model::event`](crate::Model::event), and false afterwards.
     ///
-    /// FMI 2.0 has no clocks: its description leaves them out. An importer without event mode does not tick them
-    /// either. A model that also runs there states its ticks by
-    /// [`Event::next_event_time`](crate::Event::next_event_time) as well.
+    /// FMI 2.0 has no clocks: its description leaves them out, and an importer without event mode ticks none. For
+    /// these the model also states its ticks by [`Event::next_event_time`](crate::Event::next_event_time).
     pub fn periodic_clock<F>(
         name: impl Into<String>,
         description: impl Into<String>,
@@ -229,8 +228,8 @@ impl<M> Variable<M> {
     /// * `Fixed` and `Tunable`: the clock is periodic, with an interval that depends on parameters; for `Tunable` they
     ///   may change during the run, and the next tick starts the new interval.
     /// * `Changing` and `Countdown`: [`Model::event`](crate::Model::event) sets the field to the time from now to the
-    ///   next tick. It is infinite again when the importer has read it. A clock that is `Changing` gets an interval in
-    ///   [`Model::new`](crate::Model::new) and at each tick; one that is a `Countdown` ticks only when asked to.
+    ///   next tick. After the importer has read the field, it is infinite again. A `Changing` clock gets an
+    ///   interval in [`Model::new`](crate::Model::new) and at each tick; a `Countdown` ticks once for each interval.
     pub fn timed_clock<F, G>(
         name: impl Into<String>,
         description: impl Into<String>,
@@ -379,8 +378,8 @@ impl<M> Variable<M> {
         self.any_parameter(Variability::Tunable)
     }
 
-    /// Makes a Real with a unit of temperature a [relative quantity](Variable::relative_quantity). In other units, a
-    /// difference is converted as a value is. Call it after [`Variable::unit`].
+    /// Makes a Real with a unit of temperature a [relative quantity](Variable::relative_quantity). Other units have no
+    /// offset, so a difference needs no mark. Call it after [`Variable::unit`].
     #[must_use]
     pub fn difference(self) -> Self {
         let unit = self.declaration.number.unit.as_deref().map(Unit::parse);

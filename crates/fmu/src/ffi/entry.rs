@@ -23,7 +23,7 @@ macro_rules! entry_points {
     };
 }
 
-/// Defines with `entry_points` the functions that are the same in FMI 2.0 and 3.0, but for the names of some.
+/// Defines by the macro `$entry_points` the functions that FMI 2.0 and 3.0 share, some with other names.
 macro_rules! common_entry_points {
     ($entry_points:ident: $boolean:ty, $byte:ty, $get:ident $set:ident $free:ident $size:ident $serialize:ident
         $deserialize:ident, $de_serialize_fmu_state:ident $get_nominals:ident) => {
@@ -164,7 +164,7 @@ entry_points! {
         _instance => Err(unavailable(kind));
 }
 
-/// Returns `fmi2Discard` for a status kind that a synchronous slave does not have (section 4.2.3).
+/// Returns the failure (`fmi2Discard`) for a status kind that a synchronous slave does not have (section 4.2.3).
 fn unavailable(kind: fmi2StatusKind) -> Failure {
     Failure::Discard(format!("no step is pending: status kind {kind} is not available"))
 }

@@ -20,7 +20,7 @@ use fmu_description::{ModelDescription, NativeType};
 pub(crate) use derivatives::Jacobian;
 use intermediate::Intermediate;
 
-/// The largest number of scalars in one call whose places need no buffer.
+/// The largest number of scalars in one call whose places ([`Table`]) are on the stack.
 const FEW: usize = 8;
 
 /// The part of an instance that only FMI 3.0 has.

@@ -38,8 +38,8 @@ impl<M: Model> Instance<M> {
         Ok(snapshot)
     }
 
-    /// `fmi2SetFMUstate`. An error for a state of another FMU or interface type, and for a state in event mode if the
-    /// instance of co-simulation does not use it.
+    /// `fmi2SetFMUstate`. An error for a state of another FMU or interface type, and for a state in event mode if this
+    /// instance, for co-simulation, does not use event mode.
     pub(crate) fn restore(&mut self, snapshot: &Snapshot<M>) -> Result<(), Failure> {
         if snapshot.guid != self.guid() {
             let (of, expected) = (snapshot.guid, self.guid());

@@ -22,7 +22,7 @@ impl Clocks {
 
     /// Sets `clocks` of the variables of a description. An error for a name that is not the name of a clock.
     pub(super) fn enter(&self, description: &mut ModelDescription) -> Result<(), Failure> {
-        // Without a search for each name: an array has many clocked elements.
+        // A map, because a search for each of the many elements of a clocked array would be slow.
         let indices: HashMap<String, u32> = (1..)
             .zip(&description.variables)
             .map(|(index, variable)| (variable.name.clone(), index))

@@ -1,4 +1,4 @@
-//! The description of the variables, by functions that do not depend on the model.
+//! The description of the variables, by functions that are not generic over the model.
 
 use super::structure;
 use crate::model::Failure;
@@ -73,7 +73,7 @@ fn time() -> ScalarVariable {
     }
 }
 
-/// Adds the unit of the variable to `units`, and to this unit the display unit, unless they are there. An error for a
+/// Adds the unit of the variable to `units`, and its display unit to the unit, unless they are listed. An error for a
 /// display unit with other base units.
 fn define_unit(units: &mut Vec<Unit>, variable: &Declaration) -> Result<(), Failure> {
     let Some(name) = &variable.number.unit else { return Ok(()) };
@@ -101,7 +101,7 @@ fn define_unit(units: &mut Vec<Unit>, variable: &Declaration) -> Result<(), Fail
     Ok(())
 }
 
-/// Adds the enumeration of the variable to `types`, unless it is there; an error if it has other items there.
+/// Adds the enumeration of the variable to `types`, unless it is listed; an error if it is listed with other items.
 fn define_type(types: &mut Vec<SimpleType>, variable: &Declaration) -> Result<(), Failure> {
     let Some(Enumeration { name, items }) = &variable.enumeration else { return Ok(()) };
     match types.iter().find(|known| known.name == *name) {

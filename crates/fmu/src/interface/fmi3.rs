@@ -1,5 +1,6 @@
 //! The variables of FMI 3.0, derived from those of FMI 2.0: value references that are unique over all
-//! types, arrays, and event indicators as variables.
+//! types, arrays, and event indicators as variables. The place of a scalar is its value reference in FMI 2.0 with
+//! the mark of an `Int64`, or the number of an event indicator with its mark.
 
 mod arrays;
 mod describe;
@@ -9,7 +10,7 @@ use fmu_description::{DependencyKind, ModelStructure, NativeType, Unknown};
 
 pub(crate) use describe::describe;
 
-/// Marks a place that is an event indicator and no value reference of FMI 2.0.
+/// Marks the place of an event indicator.
 pub(crate) const INDICATOR: u32 = 1 << 31;
 
 /// Marks the place of an `Int64`, to tell it from that of an enumeration.
@@ -20,7 +21,7 @@ pub(crate) const INT64: u32 = 1 << 31;
 pub(crate) struct Entry {
     pub(crate) name: String,
     pub(crate) kind: NativeType,
-    /// The value reference of FMI 2.0 of the first element, with the mark of its place, if any; the others follow.
+    /// The place of the first element; the places of the others follow.
     first: u32,
     /// Number of elements.
     count: u32,
@@ -84,9 +85,9 @@ impl Table {
         }
     }
 
-    /// Replaces the content of `places` by the value references of FMI 2.0 of all elements of the variables, in
-    /// row-major order. An error for an unknown value reference, a variable of another type, and if the variables have
-    /// not `count` elements together (section 2.2.7.1).
+    /// Replaces the content of `places` by the places of all elements of the variables, in row-major order. An error
+    /// for an unknown value reference, a variable of another type, and if the number of elements is not `count`
+    /// (section 2.2.7.1).
     pub(crate) fn locate(
         &self,
         kind: NativeType,

@@ -9,7 +9,7 @@ use fmu_description::{Causality, Dimension, Kind, ModelDescription, ScalarVariab
 /// The structural parameters of a model.
 #[derive(Default)]
 pub(super) struct Sizes {
-    /// For each element that states structural parameters, by its name: these parameters, the extents of its array.
+    /// The structural parameters that are the extents of an array, by the name of each of its elements.
     by_element: HashMap<String, Vec<String>>,
 }
 

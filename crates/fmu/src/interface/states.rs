@@ -58,9 +58,9 @@ impl<M> Interface<M> {
         }
     }
 
-    /// Sets the derivatives of the inputs for a step of `size` s from their values at its start, its middle and its
-    /// end: of the parabola through them, or of the line from start to end for an input with one derivative. Returns
-    /// whether one is not zero.
+    /// Sets the derivatives of the inputs at the start of a step of `size` s: those of the parabola through their
+    /// values at its start, middle and end, or of the line from start to end for an input with one derivative. Returns
+    /// whether a derivative is not zero.
     pub(crate) fn interpolate(
         &self,
         model: &mut M,

@@ -9,8 +9,8 @@ pub(super) fn index(position: usize) -> u32 {
     u32::try_from(position + 2).unwrap_or(u32::MAX)
 }
 
-/// Returns the position of the variable called `name`; an error, which names the variable `of` that refers to it, if
-/// there is none.
+/// Returns the position of the variable called `name`, to which the variable `of` refers; an error, which names both,
+/// if there is none.
 pub(super) fn find(variables: &[Declaration], of: &str, name: &str) -> Result<usize, Failure> {
     let position = variables.iter().position(|variable| variable.name == name);
     position.ok_or_else(|| {
@@ -62,8 +62,8 @@ pub(super) fn structure(variables: &[Declaration]) -> Result<ModelStructure, Fai
     Ok(structure)
 }
 
-/// Returns the position of the variable with the value of the one at `position`: of the target of an alias, of a Real
-/// itself; `None` for other types.
+/// Returns `position` if a Real is there, and the position of the target if an alias is there; `None` for other
+/// types.
 fn resolve_alias(variables: &[Declaration], position: usize) -> Result<Option<usize>, Failure> {
     let variable = &variables[position];
     match &variable.base {
@@ -74,7 +74,7 @@ fn resolve_alias(variables: &[Declaration], position: usize) -> Result<Option<us
 }
 
 /// Returns the row of an output or derivative. A variable that is a state, or an alias of one, depends on this state,
-/// `own_state`. Of several dependencies on one known the first one counts.
+/// `own_state`. The first of several dependencies on one known counts.
 fn dependency_row(
     variables: &[Declaration],
     position: usize,

@@ -8,7 +8,7 @@ use fmu_description::{
     BinaryType, ClockType, IntegerType, IntervalVariability, Kind, NativeType, RealType,
 };
 
-/// A Rust type of the fields of such variables.
+/// The Rust type of the values of such a type.
 pub(crate) trait Native: Clone + Sized + 'static {
     /// The type of FMI 3.0.
     const TYPE: NativeType;

@@ -120,15 +120,14 @@ impl Quartic {
 pub enum Crossing {
     /// The margin is negative or NaN at this length; at most `width` before it, it is not negative or the step starts.
     At(f64),
-    /// The margin is negative at none of the lengths that were tried, of which this is the longest one, or it is NaN
-    /// there.
+    /// The longest length that was tried. The margin is negative at none of them; at this one it may be NaN.
     NoneUpTo(f64),
 }
 
-/// Searches the first crossing of `margin`, a function of the length of a step, from an estimate on: `fraction`, above
-/// 0, of the step of `length`.
+/// Searches the first crossing of `margin`, a function of the length of a step. The search starts from an estimate:
+/// `fraction`, above 0, of the step of `length`.
 ///
-/// An estimate may be wrong: a margin may only touch zero, or change its sign by rounding. So the margin
+/// The estimate may be wrong: a margin may only touch zero, or change its sign by rounding. So the margin
 /// is evaluated at the estimate and at doubled lengths, up to the whole step. If it is negative at one of
 /// them, [`locate`] narrows the crossing to `width`.
 pub fn search(

@@ -58,8 +58,8 @@ impl Indicators {
         })
     }
 
-    /// The part of the step after which the first event is expected, by the polynomials through the five
-    /// values of each indicator; `None` if no event is expected.
+    /// The fraction of the step after which the first event is expected, by the polynomials through the
+    /// five values of each indicator; `None` if no event is expected.
     pub(super) fn first_crossing(&self) -> Option<f64> {
         let crossing = |(i, positive): (usize, &bool)| {
             let sign = if *positive { 1.0 } else { -1.0 };

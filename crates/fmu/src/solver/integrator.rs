@@ -9,14 +9,14 @@ use crate::model::Failure;
 /// Relative tolerance unless [`Integrator::set_tolerance`] sets another one.
 pub(crate) const TOLERANCE: f64 = 1e-6;
 
-/// Absolute tolerance of a state, as part of the relative tolerance and the nominal value of the state:
+/// Absolute tolerance of a state, divided by the relative tolerance and the nominal value of the state:
 /// the recommendation of FMI 2.0.5, section 2.1.6.
 const ABSOLUTE: f64 = 0.01;
 
 /// Most integration steps, rejected ones included, in one call of `advance`.
 const STEP_LIMIT: u32 = 1_000_000;
 
-/// Resolution of time, in units in the last place.
+/// Resolution of time, relative to the time.
 const RESOLUTION: f64 = 4.0 * f64::EPSILON;
 
 /// A system of ordinary differential equations `y' = f(t, y)` with event indicators `z(t, y)`.
@@ -116,8 +116,8 @@ impl Integrator {
 
     /// Starts at the `state` at `time` in s: at first, and after each event or other discontinuity.
     ///
-    /// Nothing is remembered of steps before, so that equal states continue with equal bits. `end` is the
-    /// time in s up to which the system is integrated next.
+    /// Forgets all earlier steps, so that equal states continue with equal bits. `end` is the time in s up to
+    /// which the system is integrated next.
     ///
     /// # Errors
     ///
@@ -154,9 +154,9 @@ impl Integrator {
     ///
     /// # Errors
     ///
-    /// [`Failure::Incomplete`] with the time reached if the state, its derivative or an indicator is not finite, if no
-    /// step is short enough for the tolerance or for a derivative that exists, or after a million steps; the other
-    /// failures of `system`.
+    /// [`Failure::Incomplete`] with the time reached if the state, its derivative or an indicator is not finite, if
+    /// even the shortest step exceeds the tolerance or reaches a state without a derivative, or after a million steps;
+    /// the other failures of `system`.
     pub fn advance(
         &mut self,
         system: &mut (impl System + ?Sized),
@@ -236,8 +236,8 @@ impl Integrator {
         self.norm(|i| (self.step.error(i), largest(i)))
     }
 
-    /// The root mean square over all states of a value, relative to the tolerance of a state of this
-    /// magnitude. `of` returns value and magnitude.
+    /// The root mean square over all states of value / (tolerance (0.01 nominal + magnitude)). `of` returns
+    /// value and magnitude for the index of a state.
     fn norm(&self, of: impl Fn(usize) -> (f64, f64)) -> f64 {
         if self.nominals.is_empty() {
             return 0.0;
@@ -284,7 +284,7 @@ impl Integrator {
         Ok(if bend.is_finite() { long.min(100.0 * small) } else { small })
     }
 
-    /// Returns the part of the step after which the first event is expected; `None` if none is.
+    /// Returns the fraction of the step after which the first event is expected; `None` if none is.
     fn find_crossing(
         &mut self,
         system: &mut (impl System + ?Sized),
@@ -355,7 +355,7 @@ impl Integrator {
     }
 }
 
-/// Factor from the length of a step with this scaled error to the next one.
+/// The length of the next step divided by that of a step with this scaled error.
 fn growth(error: f64) -> f64 {
     if error.is_finite() { (0.9 * libm::pow(error, -0.2)).clamp(0.2, 5.0) } else { 0.1 }
 }

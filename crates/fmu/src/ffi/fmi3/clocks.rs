@@ -1,5 +1,5 @@
-//! The functions for clocks. Intervals are in seconds, and the model determines them: functions that set an interval or
-//! count parts of a second return an error for every clock.
+//! The functions for clocks. The model determines the intervals, in seconds. So functions that set intervals or shifts,
+//! or get them as fractions, return an error for every clock.
 
 use super::super::{borrow_output, read};
 use super::entry_points_3;
@@ -41,7 +41,7 @@ entry_points_3! {
     };
 }
 
-/// Defines functions that every clock refuses.
+/// Defines functions that return an error for every clock.
 macro_rules! refused {
     ($($name:ident = $function:ident($($argument:ident: $type:ty),*), $reason:literal;)*) => {
         entry_points_3! {

@@ -1,7 +1,7 @@
 //! `fmi3GetXXX` and `fmi3SetXXX`.
 //!
 //! The number of values is compared with the sizes of the variables before any value is touched (section
-//! 2.2.7.1). In an instant at which a clock ticks, values are read as the event leaves them.
+//! 2.2.7.1). While a clock ticks, the functions return the values after the event.
 
 use super::super::{borrow_output, read, texts};
 use super::entry_points_3;

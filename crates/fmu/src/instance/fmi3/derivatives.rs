@@ -5,7 +5,7 @@ use crate::model::{Failure, Model};
 use crate::room::Room;
 use fmu_description::NativeType;
 
-/// The variables and the lengths of both vectors of a partial derivative.
+/// The variables of a partial derivative, and the lengths of the vectors of unknowns and knowns.
 pub(crate) struct Jacobian<'a> {
     pub(crate) unknowns: &'a [u32],
     pub(crate) knowns: &'a [u32],

@@ -39,7 +39,7 @@ fn intermediate(session: &mut Option<Box<Session>>) -> Option<&mut Intermediate>
 
 impl<M: Model> Instance<M> {
     /// Enters intermediate update mode for a step of `size` s, and returns the callback. Does nothing and returns
-    /// `None` without a callback, and if the importer must not step now or `size` is not a positive number.
+    /// `None` without a callback, if a step is not allowed now, and if `size` is not a positive number.
     pub(crate) fn begin_intermediate(&mut self, size: f64) -> Option<IntermediateUpdate> {
         let core = &mut self.core;
         let intermediate = intermediate(&mut self.session)?;

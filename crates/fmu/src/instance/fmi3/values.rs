@@ -157,7 +157,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// Sets enumerations: sets all values or, after a failure, none.
+    /// Sets all enumerations or, after a failure, none.
     fn set_enumerations(&mut self, places: &[u32], values: &[i64]) -> Result<(), Failure> {
         // A value beyond 32 bits is no item of any enumeration.
         let accept = |slot: &Slot<M, i32>, value: &i64| {

@@ -56,8 +56,8 @@ fn a_function_may_be_called_exactly_in_the_states_of_sections_3_2_3_and_4_2_4() 
     }
 }
 
-/// A call of each function in each state of the instance: only what may be called reaches the model; all
-/// else is an error that leaves the instance in the state error, or as lost as it was.
+/// Calls each function in each state: only an allowed call reaches the model. Any other call is an error after
+/// which the instance is in the state error; after a fatal failure the state stays fatal.
 fn walk<M: Model>(interface: InterfaceType, instantiate: impl Fn() -> Instance<M>) {
     for state in State::EVERY {
         for &function in Function::EVERY {

@@ -25,7 +25,7 @@ fn ok(
     assert_eq!(status, Status::OK, "{function:?}");
 }
 
-/// In event mode at time 0.
+/// An instance in event mode at time 0.
 fn started() -> Instance<Pendulum> {
     let mut instance = pendulum(InterfaceType::ModelExchange);
     instance.call(Function::EnterInitializationMode, Instance::enter_initialization_mode);

@@ -352,7 +352,7 @@ fn a_step_with_the_model_s_own_end_of_the_simulation_says_so() {
         let step = instance.do_step_3(0.0, 1.0).unwrap();
         assert_eq!((step.early_return, step.last_successful_time), (early, 0.25));
         assert!(step.terminate_simulation);
-        // A time that is no number is the start of the step, as in FMI 2.0.
+        // If the model ends the simulation at the time NaN, the start of the step is the time reached, as in FMI 2.0.
         let mut instance =
             instantiate::<Ending>(InterfaceType::CoSimulation, false, early).unwrap();
         let step = instance.do_step_3(0.0, 2.0).unwrap();

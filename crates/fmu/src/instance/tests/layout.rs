@@ -78,7 +78,7 @@ fn instance<M: Model>() -> Instance<M> {
     Instance::new(InterfaceType::CoSimulation, none, &description.guid, callbacks).unwrap()
 }
 
-/// Why a state of the build `From` is refused by the build `To` of the same FMU.
+/// The message with which the build `To` refuses a state of the build `From` of the same FMU.
 fn refusal<From: Model, To: Model>() -> Option<String> {
     let (from, to) = (instance::<From>(), instance::<To>());
     assert_eq!(from.guid(), to.guid(), "the descriptions are the same");

@@ -63,7 +63,7 @@ fn started_at(time: f64) -> Instance<Decay> {
     instance
 }
 
-/// What is wrong with a step.
+/// The message of the error for a step.
 fn refusal(time: f64, start: f64, size: f64) -> String {
     crate::instance::communication_step(time, start, size).unwrap_err().to_string()
 }
@@ -89,7 +89,7 @@ fn a_step_below_the_resolution_of_time_is_an_error_that_names_the_smallest_one()
     }
 }
 
-/// The master's time, a multiple of the step, advances while `t + h` is `t`.
+/// The master computes its time as a multiple of the step h, so it advances although `t + h` rounds to `t`.
 #[test]
 fn a_master_whose_time_advances_by_less_than_its_resolution_hears_of_it() {
     let (start, size) = (1e9, 1e-8);
@@ -100,7 +100,6 @@ fn a_master_whose_time_advances_by_less_than_its_resolution_hears_of_it() {
     assert_eq!(statuses[0], Status::Error, "not one call is answered by OK without a step");
 }
 
-/// Once OK, although the model did nothing and time went back.
 #[test]
 fn a_step_that_ends_before_the_time_reached_is_an_error() {
     for (start, size) in [(0.0, 1e-10), (4e-10, 1e-10), (1e-10, 2e-10)] {
@@ -113,7 +112,7 @@ fn a_step_that_ends_before_the_time_reached_is_an_error() {
     }
 }
 
-/// What is left to the stop time is a multiple of the resolution, so it is a step.
+/// The distance to the stop time is a multiple of the resolution of time, so the step is valid.
 #[test]
 fn the_rest_to_the_stop_time_is_a_step_however_small() {
     for time in [9.0_f64, 2.0, 0.3, 1e-3, 123_456.789] {

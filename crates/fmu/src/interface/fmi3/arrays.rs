@@ -2,10 +2,10 @@
 
 use fmu_description::{Causality, Elements, Kind, RealType, ScalarVariable};
 
-/// Scalars that are an array, or one scalar.
+/// The scalars of one array, or a single scalar.
 pub(super) struct Block {
     pub(super) name: String,
-    /// Position of the first scalar and their number.
+    /// Position of the first scalar, and number of scalars.
     pub(super) start: usize,
     pub(super) count: usize,
     /// Extents; empty for a scalar.

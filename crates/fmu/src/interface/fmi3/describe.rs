@@ -10,7 +10,7 @@ use fmu_description::{
     ModelExchange, ModelStructure, NativeType, RealType, ScalarVariable, Unknown, Variability,
 };
 
-/// The variables of FMI 3.0 (new), with the places of those of FMI 2.0 (old) among them.
+/// The variables of FMI 3.0 (new), and which of them has each variable of FMI 2.0 (old).
 #[derive(Default)]
 struct Builder {
     variables: Vec<ScalarVariable>,
@@ -24,8 +24,8 @@ struct Builder {
 ///
 /// * Scalars named `A[1,1]`, `A[1,2]`, ... are one array if their attributes agree.
 /// * An alias with the same attributes becomes an `Alias`; another one becomes a variable.
-/// * The parameters are knowns of outputs and derivatives (section 2.4.8): each of these depends on all
-///   of them, except a state.
+/// * The parameters are knowns of outputs and derivatives (section 2.4.8): each output and derivative
+///   depends on all parameters, unless it is a state.
 /// * The event indicators are local variables.
 pub(crate) fn describe(old: &ModelDescription, indicators: usize) -> (Table, ModelDescription) {
     let mut builder = Builder::default();
@@ -71,8 +71,8 @@ fn simulation(flags: &CoSimulation, old: &ModelDescription) -> CoSimulation {
     }
 }
 
-/// Returns the key that variables with the same value share: whether it is time, base type and value reference of FMI
-/// 2.0.
+/// Returns the key that variables with the same value share: whether the variable is time, its base type and its value
+/// reference of FMI 2.0.
 fn value_key(variable: &ScalarVariable) -> (bool, &'static str, u32) {
     let is_time = variable.causality == Causality::Independent;
     (is_time, variable.kind.base(), variable.value_reference)
@@ -228,7 +228,7 @@ impl Builder {
     }
 
     /// Returns the rows of the new variables: the row of an array has the dependencies of all its
-    /// elements, and `more` for each of the old rows.
+    /// elements. To each old row the knowns that `more` returns for its index are added.
     fn rows<'a>(&self, old: &[Unknown], more: impl Fn(u32) -> &'a [u32]) -> Vec<Unknown> {
         let mut rows: Vec<Unknown> = Vec::new();
         let mut by_reference: HashMap<u32, (usize, u32)> = HashMap::new();
@@ -241,7 +241,7 @@ impl Builder {
                     by_reference.insert(reference, (rows.len(), index));
                     rows.push(new);
                 }
-                // Another element of an array; the row of an alias is the row of its variable.
+                // Another element of an array. The row of an alias that became a variable is left out.
                 Some(&(position, same)) if same == index => merge(&mut rows[position], &new),
                 Some(_) => {}
             }
