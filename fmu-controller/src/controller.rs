@@ -25,9 +25,8 @@ use crate::signals::{OperatingPoint, Signals, Values};
 use crate::validity::MeasurementCheck;
 use aso_controller::Design;
 
-/// The part of the range of an actuator by which a free command passes a limit, and the part of a command by which a
-/// loss passes its fraction, before that is an event: no event indicator is zero after an event, and rounding causes no
-/// second event.
+/// How far a free command must pass a limit, as a fraction of the actuator's range, or an estimated loss its stated
+/// fraction, before this is an event. So no event indicator is zero after an event, and rounding causes no second one.
 const HYSTERESIS: f64 = 1e-9;
 
 /// A fault-tolerant controller with an augmented state observer, for a linear plant of any size.
@@ -36,7 +35,7 @@ const HYSTERESIS: f64 = 1e-9;
 #[derive(Clone, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that are independent")]
 pub struct AsoController {
-    /// Copied where a parameter is changed, not with an FMU state.
+    /// Copied when a parameter is changed, but not with each FMU state.
     pub(crate) design: Shared<Design>,
     pub(crate) x_hat_0: Vec<f64>,
     pub(crate) f_hat_0: Vec<f64>,
@@ -72,7 +71,7 @@ pub struct AsoController {
     detector: Option<Detector>,
     /// The measurements that the importer sets, while `values` has those that are used; `None` if every one is used.
     measurement_check: Option<MeasurementCheck>,
-    /// Whether the clock of the samples ticks. The samples follow from time, and so does the clock.
+    /// The clock variable, which the importer ticks. The controller finds its samples by time, not by this clock.
     pub(crate) sample_clock: bool,
     /// The design at the scheduling variable of the last sample, or of now in a continuous controller; `None`
     /// without a schedule.
@@ -82,7 +81,7 @@ pub struct AsoController {
     pub(crate) schedule_slope: f64,
     /// The value of the scheduling variable for which `current` was computed.
     schedule_value: f64,
-    /// The same value held within the grid.
+    /// `schedule_value` limited to the grid of the schedule.
     pub(crate) schedule_at: f64,
     /// Co-simulation of a continuous controller with a schedule: the exporter integrates its equations.
     is_integrated: bool,
@@ -232,8 +231,8 @@ impl Model for AsoController {
         self.integrate(step)
     }
 
-    /// Stops at the next sample of a sampled controller, which is an event. A sample at the start that no event has
-    /// taken is taken first. A continuous controller makes the whole step.
+    /// Stops at the next sample of a sampled controller, which is an event. If no event has taken the sample at the
+    /// start of the step, it is taken first. A continuous controller makes the whole step.
     fn step_to_event(&mut self, step: &Step) -> Result<Option<f64>, Failure> {
         if self.sampler.is_none() {
             return self.step(step).map(|()| None);
@@ -310,9 +309,9 @@ impl Model for AsoController {
         Some(&mut self.log)
     }
 
-    /// `None`, no model exchange, for a continuous controller with a detection, whose residual filter is computed only
-    /// in steps of co-simulation, together with the observer; and for one that checks its measurements, which it does
-    /// at communication points only.
+    /// `None`, no model exchange, for a continuous controller with a detection or a check of measurements: the residual
+    /// filter is stepped together with the observer in co-simulation only, and measurements are checked at
+    /// communication points only.
     fn model_exchange(&self) -> Option<ModelExchange> {
         let is_stepped = self.detector.is_some() || self.measurement_check.is_some();
         if is_stepped && self.sampler.is_none() {
@@ -358,7 +357,7 @@ impl Model for AsoController {
             let next_event_time = self.sampler.as_ref().map(|sampler| sampler.clock.next_instant());
             return Ok(Event { next_event_time, ..Event::default() });
         }
-        // In an integrated step a limit is reached and left where it is, and events only separate the parts.
+        // In a step that the exporter integrates, channels reach and leave limits between the events, too.
         self.frozen = !self.is_integrated;
         let restarted = self.reconfigure(time, None);
         self.interpolate(0.0, time);

@@ -5,8 +5,8 @@
 //! time nothing depends on `compensate` or `time`. A command with limits is not linear in what it
 //! depends on.
 //!
-//! In a continuous controller with a schedule everything but y_f' and u_t' depends on the scheduling variable, too,
-//! with which the factors change.
+//! In a continuous controller with a schedule all unknowns except y_f' and u_t' also depend on the scheduling
+//! variable, with which the gains change.
 //!
 //! A sampled controller changes its outputs at samples only (`fmi2DoStep`, `fmi2NewDiscreteStates`),
 //! so at a point in time they depend on nothing. Its initial values are the values of sample 0.
@@ -89,7 +89,7 @@ fn transfers(design: &Design, limited: bool) -> Option<Group> {
     (!names.is_empty()).then(|| (kinds_of_feedback(design, limited)[0], names))
 }
 
-/// The dependencies of command `j`, whose only u_t is its own: those of [`of_law`] and this u_t.
+/// The dependencies of command `j`: those of [`of_law`] and its own u_t.
 fn of_feedback_of(design: &Design, j: usize, kinds: [DependencyKind; 2]) -> Vec<Group> {
     let mut groups = of_law(design, kinds);
     let kind = if kinds[0] == Fixed { Constant } else { kinds[0] };
@@ -141,8 +141,8 @@ pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
     }
 }
 
-/// `groups`, without the kinds of constant factors in a controller that checks measurements: its factors change when a
-/// measurement is held.
+/// `groups`; in a controller that checks measurements, constant factors become discrete, because they change when the
+/// last value replaces a measurement.
 fn groups_by_validity(design: &Design, mut groups: Vec<Group>) -> Vec<Group> {
     if design.checks_measurements() {
         for (kind, _) in &mut groups {
@@ -158,7 +158,7 @@ fn groups_by_validity(design: &Design, mut groups: Vec<Group>) -> Vec<Group> {
 fn of_constant_slope(design: &Design, i: usize) -> Vec<Group> {
     let (n, q) = (design.states.len(), design.faults.len());
     if i < n {
-        // A direct term has the measurements among those of the feedback.
+        // With a direct term, the measurements are among the dependencies of the feedback.
         let measured = design.p_f.is_none().then(|| (Fixed, observed(design)));
         let mut groups: Vec<_> = measured.into_iter().collect();
         groups.extend(of_feedback(design, kinds_of_feedback(design, has_limits(design))));
@@ -174,7 +174,7 @@ fn of_constant_slope(design: &Design, i: usize) -> Vec<Group> {
     } else {
         let k = i - n - q;
         let mut observed = vec![design.measurements[k].name.clone()];
-        // A direct term has y_f among the dependencies of the feedback, which D passes on.
+        // With D and a direct term, y_f is among the dependencies of the feedback.
         if design.d.is_none() || design.p_f.is_none() {
             observed.extend(names::filtered(design).nth(k));
         }
@@ -308,8 +308,8 @@ pub(crate) fn of_initial_command(design: &Design, j: usize) -> Vec<String> {
     by_schedule(design, names)
 }
 
-/// Same as [`groups_by_validity`] without a schedule; with one, a single group of dependencies that are not linear,
-/// with all names and the scheduling variable.
+/// Same as [`groups_by_validity`] without a schedule; with one, a single group of nonlinear dependencies, with all
+/// names and the scheduling variable.
 pub(crate) fn groups_by_schedule(design: &Design, groups: Vec<Group>) -> Vec<Group> {
     if design.schedule.is_none() {
         return groups_by_validity(design, groups);
@@ -318,7 +318,7 @@ pub(crate) fn groups_by_schedule(design: &Design, groups: Vec<Group>) -> Vec<Gro
     vec![(Dependent, by_schedule(design, names))]
 }
 
-/// `names`; with a schedule its variable replaces the matrices, which are no parameters then.
+/// `names`; with a schedule the matrices are no parameters, and the scheduling variable replaces them.
 fn by_schedule(design: &Design, mut names: Vec<String>) -> Vec<String> {
     let Some(schedule) = &design.schedule else { return names };
     let elements =
@@ -371,7 +371,7 @@ pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
         let k = i - n - q;
         names.push(design.measurements[k].name.clone());
         if design.checks_measurements() {
-            // Its operating point replaces a measurement that is not used.
+            // The operating point replaces a measurement that is not used.
             names.extend(operating_measurements(design).nth(k));
         }
         return if may_rest { by_schedule(design, names) } else { names };
@@ -395,7 +395,7 @@ pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
     if may_rest || is_current(design) { by_schedule(design, names) } else { names }
 }
 
-/// Whether a controller may rest at sample 0: a last value of a measurement may not be used for one sample.
+/// Whether the controller may rest at sample 0: some longest hold is shorter than one sample.
 fn may_start_at_rest(design: &Design) -> bool {
     let is_lost = |period| design.measurements.iter().any(|y| y.most_held(period) == Some(0));
     design.sample_time.is_some_and(is_lost)
@@ -420,7 +420,7 @@ pub(crate) fn of_initial_slope(design: &Design, i: usize) -> Vec<String> {
         names.extend((0..design.actuators.len()).flat_map(|j| of_initial_deviation(design, j)));
         names
     } else {
-        // y_f starts at y.
+        // y_f starts at y, so y_f' is 0.
         return Vec::new();
     };
     by_schedule(design, names)

@@ -2,16 +2,16 @@
 //!
 //! The residuals follow from the measurements and the commands that are really applied, not from the observer. A
 //! sampled controller computes and tests them in each sample. In a continuous one the filter is part of the piecewise
-//! linear system of the observer (`observer.rs`), stepped as exactly as the observer, and its residuals are averages
-//! over intervals of the detection's own sample time, which does not depend on the communication step:
+//! linear system of the observer (`observer.rs`, with M and N) and stepped exactly. Its residuals are averages over
+//! intervals of the detection's own sample time T, times T^(1/2); q integrates them in each interval:
 //!
 //! ```text
 //! [z; x_r; q]' = [M, 0, 0; B_u K, A, 0; D_u K, C, 0] [z; x_r; q] + [N; B_u S + B_y Y; D_u S + D_y Y] v
 //! r[k] = q(t_k) / T^(1/2),  q(t_k) is then set to 0
 //! ```
 //!
-//! v = [y; r; w], w the commands of the channels at a limit, u = K z + S v, y = Y v. A sampled controller also has a
-//! sample at the start of a run, which is not tested.
+//! v = [y; r; w], w the commands of the channels at a limit, u = K z + S v, y = Y v; A, B_u, B_y, C, D_u, D_y are of
+//! the filter, x_r is its state. A sampled controller also has a sample at the start of a run, which is not tested.
 
 mod decision;
 mod tests_of_residuals;
@@ -31,9 +31,9 @@ use aso_controller::design::detection::DetectionDesign;
 pub(crate) use decision::Decision;
 use tests_of_residuals::TestState;
 
-/// The part of the sample time by which a sample may be early, in addition to [`clock_rounding`].
+/// The fraction of the sample time by which a sample may be early, in addition to [`clock_rounding`].
 const TOLERANCE: f64 = 1e-6;
-/// Times between samples are rounded to this part of the sample time, so that equal times have equal bits.
+/// Times between samples are rounded to this fraction of the sample time, so that equal times have equal bits.
 const RESOLUTION: f64 = 1.0 / 1_073_741_824.0;
 /// The most samples in one step.
 const MOST_SAMPLES: f64 = 1e7;
@@ -45,7 +45,7 @@ pub(crate) struct Detector {
     state: Vec<f64>,
     /// Start of the run, or end of the last rest, in s.
     start: f64,
-    /// Number of samples since.
+    /// Number of samples since `start`.
     samples: f64,
     pub(crate) residuals: Vec<f64>,
     pub(crate) statistics: Vec<f64>,
@@ -171,7 +171,7 @@ impl Detector {
             let rounded = ((instant - start) / (RESOLUTION * period)).round();
             let due = rounded * RESOLUTION * period;
             let sampled = due <= end + tolerance;
-            // A sample at the end, up to rounding, leaves the size of the part as it is.
+            // A sample that is due at the end, up to rounding, is taken exactly at the end.
             let to = if due < end - tolerance { due } else { end };
             if to > at {
                 self.propagate(design, detection, stretch, at, to - at)?;
@@ -192,7 +192,7 @@ impl Detector {
         Ok(())
     }
 
-    /// Advances [z; x_r; q], in `before`, by `size` s from `at` s after the start of the part.
+    /// Advances [z; x_r; q], stored in `before`, over `size` s, starting `at` s after the start of the part.
     fn propagate(
         &mut self,
         design: &Design,
@@ -222,8 +222,8 @@ impl Detector {
         Ok(())
     }
 
-    /// Tests the residuals at `time` in s, unless it is before `detect_from`, and decides. Clears sums, windows and
-    /// decision first if a reset is asked for.
+    /// Tests the residuals at `time` in s, unless it is before `detect_from`, and decides. If `reset` is set, clears
+    /// sums, windows and decision first.
     fn decide(&mut self, detection: &DetectionDesign, time: f64) {
         if self.reset {
             self.clear();
@@ -252,7 +252,7 @@ impl Detector {
     }
 }
 
-/// Matrices of [z; x_r; q]' over [z; x_r; q] and [y; r; w] in `mode`.
+/// The matrices by which [z; x_r; q]' depends on [z; x_r; q] and on [y; r; w] in `mode`.
 fn system(
     design: &Design,
     detection: &DetectionDesign,

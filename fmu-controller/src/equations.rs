@@ -32,11 +32,11 @@
 //! x_i' = r - H y + F_i f_hat + L_w (u - (K_x x_hat + K_f f_hat + K_i x_i + N_r r))
 //! ```
 //!
-//! H takes measurements whose rows of D are zero. x_i integrates the distance of the references from H y without
-//! the estimated sensor faults, -F_i f_hat.
+//! H uses only measurements whose rows of D are zero. x_i integrates the distance of the references from
+//! H y - F_i f_hat, that is H y without the estimated sensor faults.
 //! The last term is the back-calculation of Åström and Rundqwist, Integrator windup and how to avoid it
 //! (American Control Conference 1989): it is not zero while a command is at a limit, and then lets x_i
-//! follow the command that is really applied. Each term is there where the design states its matrix.
+//! follow the command that is really applied. A term is absent if the design does not state its matrix.
 //!
 //! A design with a transfer adds u_t to u, also to the commands in x_i':
 //!

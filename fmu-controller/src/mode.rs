@@ -54,8 +54,8 @@ impl Mode {
         (0..64).filter(move |j| self.is_gone(*j))
     }
 
-    /// The gains in force in place of those of the intact plant: the fall-back, those without the actuators that are
-    /// gone, or, where the design has neither, those without the first of them. `None` if the gains of the intact plant
+    /// The gains that replace those of the intact plant: those of the fall-back, those without all actuators that are
+    /// gone or, if the design has none for these, those without the first one. `None` if the gains of the intact plant
     /// are in force.
     pub(crate) fn gains(self, design: &Design) -> Option<GainSet<'_>> {
         if self.fallen_back {
@@ -86,8 +86,7 @@ impl Mode {
         self.is_at(0, j) || self.is_at(1, j) || self.is_gone(j)
     }
 
-    /// Whether the equations of both modes have the same matrices: it does not matter at which of its limits a channel
-    /// is.
+    /// Whether the equations of both modes have the same matrices: the same channels are at a limit, lower or upper.
     pub(crate) fn has_the_matrices_of(self, other: Self) -> bool {
         let free = |mode: Self| Self { lower: mode.lower | mode.upper, upper: 0, ..mode };
         free(self) == free(other)

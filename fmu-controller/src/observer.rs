@@ -170,8 +170,8 @@ impl Observer {
 
     /// Advances `z` over a part of the step.
     ///
-    /// If a channel reaches or leaves a limit, the part is halved until that instant is known to 2^-20 of it. A channel
-    /// that reaches and leaves a limit before the middle of a part, or between its middle and its end, is not detected.
+    /// If a channel reaches or leaves a limit, the part is halved until that instant is known to 2^-20 of its size. A
+    /// channel that reaches and leaves a limit within one half of a part is not detected.
     ///
     /// Calls `follow` for each part in which the mode stays.
     pub(crate) fn advance(

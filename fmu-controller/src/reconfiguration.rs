@@ -11,19 +11,19 @@
 //! with the matrices of the design for the actuators that are gone, all of which are stuck. The estimates of
 //! their faults restart at 0; they are then the distance of the real effect from the assumed one.
 //!
-//! The fall-back is one more set of gains, which serves every case of the design without knowing which one
-//! it is:
+//! The fall-back is one more set of gains, which serves every actuator failure of the design, so that it need not be
+//! known which one has happened:
 //!
 //! ```text
 //! u = K_x x_hat + K_f f_hat
 //! ```
 //!
 //! the second term if the design states K_f. It is in force while the input `fall_back` is true, and while
-//! the design has no matrices for the actuators that are gone. The observer continues with the commands of
-//! u, and f_hat with its estimates, also while the intact controller would hold them. While `fall_back` is
-//! true no estimate decides that an actuator is gone: the loss of an actuator without a fault of its own may
-//! look like the loss of another one. Without a fall-back the matrices of several actuators that have none
-//! are those of the first one.
+//! the design has no matrices for the actuators that are gone. The observer then uses the commands u, and
+//! estimates f_hat even when the intact controller would hold it. While `fall_back` is true, no estimate
+//! decides that an actuator is gone: the loss of an actuator without a fault of its own may look like the
+//! loss of another one. In a design without a fall-back, several actuators without matrices for their
+//! combination have the matrices of the first one.
 //!
 //! The decision is made at the start of each communication step, at each event, and at each sample; at
 //! initialization no actuator is gone.
@@ -105,7 +105,7 @@ impl Reconfigurator {
     }
 
     /// The time in s at which the next actuator counts as gone if the estimated losses above their fractions stay
-    /// there; `None` if there are none, or all of them are decided.
+    /// there; `None` if no loss is above its fraction, or all actuators with such losses already count as gone.
     pub(crate) fn next_decision(&self, design: &Design) -> Option<f64> {
         let ends =
             design.reconfigurations.iter().zip(&self.above_since).filter_map(|(case, since)| {

@@ -113,7 +113,7 @@ impl Signals {
     }
 
     /// Sets z, y and r to the derivatives of their deviations with respect to time: z' and the slopes in `values`, less
-    /// the derivatives of the operating point, which `design` has in its place.
+    /// the derivatives of the operating point, which are the operating point of `design`.
     pub(crate) fn set_rates(&mut self, z: &[f64], values: &Values, design: &Design) {
         self.z.copy_from_slice(z);
         self.y.copy_from_slice(&values.y_slopes);
@@ -151,7 +151,7 @@ impl Values {
     pub(crate) fn rest(&mut self, point: &OperatingPoint) {
         self.law = None;
         for (value, point) in self.z.iter_mut().zip(&point.z) {
-            // The sum has the bits of other estimates: -0 becomes 0.
+            // Adding 0 turns -0 into 0, as in `set_estimate`.
             *value = 0.0 + point;
         }
     }

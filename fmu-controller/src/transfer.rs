@@ -6,9 +6,9 @@ use crate::signals::{OperatingPoint, Signals, Values};
 use aso_controller::Design;
 use aso_controller::design::Actuator;
 
-/// The part of its range by which a continuous command that is at a limit when its law changes starts beyond the limit.
-/// So the command stays at the limit, and no event indicator changes its sign at the event: FMPy's Euler method would
-/// miss the change back in the next step.
+/// A continuous command that is at a limit when its law changes starts beyond the limit, by this fraction of its range.
+/// So it stays at the limit, and no event indicator changes its sign at the event: FMPy's Euler method would miss the
+/// change back in the next step.
 const BEYOND_LIMIT: f64 = 2e-9;
 
 impl Values {
@@ -19,8 +19,8 @@ impl Values {
     /// u_t = u before - (K_x x_hat + K_f f_hat + K_i x_i + N_r r + K_s u_stuck)
     /// ```
     ///
-    /// and 0 for an actuator that is gone. Returns whether u_t was set: not without a transfer, nor for the first
-    /// commands after a start or a rest, for which only the law is recorded.
+    /// and 0 for an actuator that is gone. Returns whether u_t was set. Without a transfer, nothing is done; for the
+    /// first commands after a start or a rest, only the law is recorded.
     pub(crate) fn transfer(
         &mut self,
         design: &Design,

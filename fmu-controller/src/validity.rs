@@ -40,7 +40,7 @@ pub(crate) struct MeasurementCheck {
     longest: Vec<f64>,
     /// Whether the last value replaces any measurement.
     pub(crate) is_held: bool,
-    /// Whether it replaces one for too long: the controller rests.
+    /// Whether the last value replaces a measurement for too long, so that the controller rests.
     pub(crate) is_lost: bool,
 }
 
@@ -135,8 +135,8 @@ impl MeasurementCheck {
         }
     }
 
-    /// Sets the measurements of `values` to the components of a direction. Nothing depends on a measurement that is not
-    /// used; in initialization mode its operating point replaces it, whose component `initial` has.
+    /// Sets the measurements of `values` to the components of a direction. A measurement that is not used has the
+    /// component 0, in initialization mode that of its operating point in `initial`.
     pub(crate) fn take_direction(
         &self,
         direction: &Self,

@@ -43,8 +43,8 @@ pub(crate) fn for_each(extents: &[&Expr], body: TokenStream) -> TokenStream {
     })
 }
 
-/// The expression for an array whose elements have the default value of their type; for one such value
-/// without dimensions.
+/// The expression for an array whose elements have the default value of their type; without dimensions,
+/// for the default value itself.
 pub(crate) fn default_value(dimensions: usize) -> TokenStream {
     let element = quote!(::core::default::Default::default());
     (0..dimensions).fold(element, |inner, _| quote!(::core::array::from_fn(|_| #inner)))

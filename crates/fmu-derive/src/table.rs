@@ -93,7 +93,7 @@ fn default(ident: &Ident, model: &Model<'_>) -> Option<TokenStream> {
     let fields = model.starts.iter().map(|(field, start)| {
         let variable = find(&model.variables, field);
         if let Some(value) = start {
-            // For `into` a literal would be an i32 or f64, which not every type of FMI 3.0 converts.
+            // By `into`, a literal would be an i32 or f64, which does not convert to every type of FMI 3.0.
             if variable.is_some_and(|variable| variable.base.is_fmi3_number()) {
                 return quote!(#field: #value);
             }

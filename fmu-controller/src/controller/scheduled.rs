@@ -62,7 +62,7 @@ impl AsoController {
     }
 
     /// Sets the derivatives of matrices and operating point of a scheduled controller in the direction
-    /// of `direction`, at the value that selected them.
+    /// of `direction`, at the value of the scheduling variable for which they were interpolated.
     pub(super) fn differentiate_schedule(&self, direction: &mut Self) {
         let Self { design, current, values, schedule_input, .. } = direction;
         let (Some(schedule), Some(current)) = (&self.design.schedule, current) else { return };

@@ -55,8 +55,8 @@ impl AsoController {
         values.transfer(design, mode, operating_point, deviations)
     }
 
-    /// Sets u_t where compensation starts or ends within a step, at `time`, `offset` s after its start. The last
-    /// commands are then those of the law before at the deviations z.
+    /// Sets u_t where compensation starts or ends within a step, at `time`, `offset` s after its start. The commands
+    /// that do not jump are then those of the old law at the deviations z.
     fn transfer_at(&mut self, compensating: bool, time: f64, offset: f64) {
         let after = self.free_mode(compensating);
         if self.design.transfer.is_none() || self.values.law == Some(after.law(&self.design)) {
@@ -199,7 +199,7 @@ impl AsoController {
                 deviations.z[at] = values.z[at] - operating_point.z[at];
             }
         }
-        // The deviations z are those of the end of the step before, or of the start.
+        // The deviations z are still those of the end of the previous step, or of the start of the run.
         self.deviations.set_inputs(&self.values, &self.operating_point, 0.0);
         self.transfer(self.free_mode(!inside && self.is_compensating(step.start)));
         if inside {
@@ -298,7 +298,7 @@ impl AsoController {
         while let Some(offset) = sampler.time_to_sample(start, end) {
             let instant = sampler.clock.next_instant();
             let mut resumes = false;
-            // The measurements of the sample at the start are taken before it.
+            // Before sample 0, initialization has taken the measurements, and no actuator is gone.
             if !sampler.is_at_start() {
                 self.reconfigure(instant, Some(&mut sampler));
                 resumes = self.take_measurements(instant, |check, values| {

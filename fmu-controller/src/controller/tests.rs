@@ -43,7 +43,7 @@ fn ready(mut controller: AsoController) -> AsoController {
     controller
 }
 
-/// A step with the inputs `y`, and the references after them if there are more numbers.
+/// A step with the inputs `y`: the measurements, and after them the references, if any.
 fn step(controller: &mut AsoController, start: f64, size: f64, y: &[f64], slope: &[f64]) {
     let values = &mut controller.values;
     let (y, r) = y.split_at(values.y.len());
@@ -57,7 +57,7 @@ fn step(controller: &mut AsoController, start: f64, size: f64, y: &[f64], slope:
     controller.step(&Step { start, size }).unwrap();
 }
 
-/// Right-hand side for the small design at time t and y(t), by the equations of the doc comment.
+/// Right-hand side for the small design at time t and y(t), by the equations in the comment of `equations.rs`.
 fn small_rates(z: [f64; 3], t: f64, y: f64, limits: [f64; 2]) -> [f64; 3] {
     let on = t >= 0.35;
     let u = (-3.0 * z[0] - 2.0 * z[1] + if on { z[2] } else { 0.0 }).clamp(limits[0], limits[1]);

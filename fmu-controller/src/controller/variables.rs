@@ -62,7 +62,7 @@ fn times_second(unit: Option<&String>) -> Option<String> {
     let unit = unit?;
     let integral = match unit.strip_suffix("/s") {
         Some(unit) => unit.to_owned(),
-        // `km/h.s` is no unit: a single unit or parentheses follow a stroke.
+        // `km/h.s` is no unit of FMI: after `/`, only a single unit or parentheses may follow.
         None if unit.contains('/') => format!("s.{unit}"),
         None => format!("{unit}.s"),
     };
@@ -159,7 +159,7 @@ fn schedule_at(design: &Design) -> Option<Variable> {
     Some(output(design, with_unit(variable, unit), groups).initially(initial))
 }
 
-/// The output with the actuator that the controller does without, if the design has reconfigurations or a fall-back.
+/// The output with the number of the actuator that is gone, if the design has reconfigurations or a fall-back.
 fn reconfiguration(design: &Design) -> Option<Variable> {
     let mut text =
         "Number of the actuator that the controller does without; 0 if there is none".to_owned();

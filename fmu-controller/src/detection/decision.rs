@@ -33,8 +33,8 @@ impl Decision {
         }
     }
 
-    /// Sets `isolated` to the only fault to which exactly the tests react that have given an alarm; -1 if there is none
-    /// or there are several. Does nothing before an alarm.
+    /// Sets `isolated` to the fault for which the tests that react to it are exactly those that have alarmed; -1 if no
+    /// fault or several faults fit. Does nothing before an alarm.
     pub(crate) fn isolate(
         &mut self,
         detection: &DetectionDesign,

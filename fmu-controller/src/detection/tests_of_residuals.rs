@@ -1,4 +1,5 @@
-//! The tests: cumulative sums of one residual, or the mean of several over a window.
+//! The tests: cumulative sums of one residual r, with drift kappa, or the mean of several over a window of N samples; h
+//! is the threshold.
 //!
 //! ```text
 //! S+ = max(0, S+ + r - kappa),  S- = max(0, S- - r - kappa)      alarm: max(S+, S-) > h
@@ -42,7 +43,7 @@ impl TestState {
         self.has_alarmed = false;
     }
 
-    /// Clears the sums and the statistic; an alarm stays.
+    /// Clears the sums and the statistic, but not an alarm.
     pub(super) fn restart(&mut self) {
         self.sums.fill(0.0);
         (self.count, self.statistic) = (0, 0.0);

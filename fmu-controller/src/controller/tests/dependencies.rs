@@ -11,7 +11,7 @@ use super::sized::{
 use super::*;
 use crate::dependencies;
 
-/// Time (`t_on` is 0.5), compensate, monitor, distance of the limits from their places.
+/// Time (`t_on` is 0.5), compensate, monitor, shift of the limits.
 type Situation = (f64, bool, bool, f64);
 
 const SITUATIONS: [Situation; 8] = [
@@ -104,7 +104,7 @@ fn initial_values_depend_on_what_is_listed_and_on_nothing_else() {
     }
 }
 
-/// How each unknown changed by each known in every situation: the factors.
+/// For each pair of unknown and known, the change of the unknown divided by that of the known, in every situation.
 fn factors(of: Shape) -> BTreeMap<(String, String), Vec<f64>> {
     let mut all: BTreeMap<_, Vec<f64>> = BTreeMap::new();
     for situation in SITUATIONS {
@@ -145,7 +145,7 @@ fn kind(factors: &[f64], limited: bool) -> Option<DependencyKind> {
     }
 }
 
-/// Whether the row of this unknown has factors that are not constant, or cut off by a limit.
+/// Whether the unknown depends on its knowns nonlinearly, or through a command with limits.
 fn is_bent((sizes, limits, features): Shape, unknown: &str) -> bool {
     match unknown.strip_prefix("actuators") {
         Some(index) => {

@@ -44,8 +44,8 @@ fn each_mode(designs: &[Shape], check: impl Fn(&AsoController, f64)) {
     }
 }
 
-/// The derivative of the unknowns `at` some place is their difference quotient, `along` a direction
-/// in `knowns`; `evaluate` is the way from knowns to unknowns.
+/// Checks the derivative of the unknowns against their difference quotient, `along` a direction in
+/// `knowns`; `evaluate` computes the unknowns from the knowns.
 fn is_the_quotient(
     model: &AsoController,
     (at, knowns): (&At, &[Real]),
@@ -72,7 +72,7 @@ fn is_the_quotient(
         let quotient = (ahead[k] - behind[k]) / (2.0 * step);
         let size = 1.0 + ahead[k].abs().max(quotient.abs());
         let name = &unknown.name;
-        // A loss is no linear function of its command, nor a sliding-mode law of the innovation: the
+        // A loss is not linear in its command, and a sliding-mode law not in the innovation: the
         // quotient has an error of second order.
         let nonlinear = name.starts_with("E_hat") || model.design.sliding_mode.is_some();
         let bent = if nonlinear { 1e3 * step * step } else { 0.0 };
@@ -81,7 +81,7 @@ fn is_the_quotient(
     }
 }
 
-/// Each known by itself, then all together.
+/// Checks the derivatives with respect to each known, then along a direction in all knowns.
 fn is_the_quotient_everywhere(
     model: &AsoController,
     at: &At,

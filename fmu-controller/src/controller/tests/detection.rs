@@ -38,7 +38,7 @@ struct Followed {
 }
 
 impl Followed {
-    /// The cumulative sums of the residuals from 0.2 s on, those after sample `first` at (k + 1) T.
+    /// Tests the residuals from position `first` on by cumulative sums; residual k is of the time (k + 1) T.
     fn test(mut self, first: usize, [drift, threshold]: [f64; 2]) -> Self {
         let (mut up, mut down, mut since) = (0.0_f64, 0.0_f64, [0.0; 2]);
         for (k, r) in self.residuals.iter().enumerate().skip(first) {

@@ -27,7 +27,7 @@ fn rates(controller: &mut AsoController, t: f64, z: [f64; 3]) -> [f64; 3] {
 }
 
 /// Integrates to 1 s by classic Runge-Kutta steps of 50 us, with events at t_on and after each
-/// step that changed the sign of an indicator; how many of the second kind there were.
+/// step that changed the sign of an indicator. Returns z and the number of such steps.
 fn integrate(limits: &str) -> ([f64; 3], usize) {
     let (mut controller, event) = exchanged(limits);
     assert_eq!(event.next_event_time, Some(0.35));

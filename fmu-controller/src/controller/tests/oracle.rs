@@ -224,8 +224,8 @@ impl Oracle {
         self.u_op.clone()
     }
 
-    /// A sample at z[k|k-1] with the inputs [y; r] and the command before: the estimate that is used, u,
-    /// z[k+1|k]. It compensates if the last switch is on; the sample before did if the second one is.
+    /// Takes a sample at z[k|k-1] with the inputs [y; r] and the previous command. Returns the estimate that is used, u
+    /// and z[k+1|k]. Switches: a current estimator; compensation at the previous sample; compensation now.
     pub(super) fn sample(
         &self,
         z: &Estimate,
