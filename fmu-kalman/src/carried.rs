@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 
 /// The design and the plant in the files of the FMU, with an instance of the plant and the memory of the filter.
 ///
-/// The instance is evaluated as a function of time, states and inputs. So copies of the filter, as FMU states are,
-/// share it.
+/// Copies of the filter, such as FMU states, share the instance, because it is only evaluated as a function of time,
+/// states and inputs.
 pub(crate) struct Carrier {
     pub(crate) design: KalmanDesign,
     plant: PathBuf,
@@ -37,8 +37,8 @@ pub(crate) struct Prediction<'a> {
     pub(crate) transform: Transform,
 }
 
-/// Sample `number` at `time` in s: the commands `u` until then, and the measurements. Measurement k is used at one of
-/// `every[k]` samples.
+/// Sample `number` at `time` in s: the commands `u` until then, and the measurements. Measurement k is used in every
+/// `every[k]`-th sample.
 pub(crate) struct Sample<'a> {
     pub(crate) number: f64,
     pub(crate) time: f64,
@@ -185,7 +185,7 @@ struct CarriedPlant {
     n: usize,
     /// The commands of the sample.
     u: Vec<f64>,
-    /// The values of the inputs that are faults, without faults.
+    /// The values without faults of the inputs to which faults are added.
     free_inputs: Vec<f64>,
     /// All inputs of the plant with the faults.
     inputs: Vec<f64>,
@@ -223,11 +223,11 @@ enum Position {
     Measurement(usize),
 }
 
-/// The method of Runge and Kutta of order 4 (W. Kutta 1901): the points of a step, as parts of it, and the weights of
+/// The Runge-Kutta method of order 4 (W. Kutta 1901): the points of a step, as fractions of it, and the weights of
 /// their derivatives.
 const POINTS: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
 const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
-/// The part of an integration step to which state events are located.
+/// The fraction of an integration step to which state events are located.
 const EVENT_WIDTH: f64 = 1e-9;
 /// The largest number of state events in an integration step.
 const MOST_EVENTS: usize = 1000;

@@ -181,7 +181,7 @@ impl Model for KalmanFilter {
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         let carrier = self.carrier()?;
-        // An FMU state may be set before an initialisation, or after one at another time.
+        // After an FMU state was set, the plant may be closed, or open for another start time.
         carrier.start(self.clock.first())?;
         let (mut from, transform) = (step.start, self.transform());
         while let Some(instant) = self.clock.next_until(step.end()) {

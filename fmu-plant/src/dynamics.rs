@@ -59,7 +59,7 @@ impl Force {
     }
 }
 
-/// Cart and pendulum, equation (20) with the missing `l` and dot restored:
+/// Cart and pendulum, equation (20) with the missing `l` and dot restored, letters as in [`Parameters`]:
 ///
 /// `(M + m) x_p'' + F_x x_p' + m l (theta'' cos theta - theta'² sin theta) = u - f`
 ///

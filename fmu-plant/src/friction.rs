@@ -28,11 +28,11 @@ impl Regime {
     }
 }
 
-/// Equation (21) with the cart velocity `v`:
+/// Equation (21) with the cart velocity `v`, letters as in [`Parameters`]:
 /// `f = g(v) Sign(v)`, `g(v) = F_c + (F_s - F_c) exp(-(|v| / v_s)^delta)`,
 /// and `Sign(0) = [-F_s, F_s] / F_s`: at rest the friction balances the other forces.
 ///
-/// Source: Patton and Klinkhieo (2009), equation (21); the exponent and the velocity are repaired.
+/// Source: Patton and Klinkhieo (2009), equation (21), with corrected exponent and velocity.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct StribeckLaw<D = f64> {
     coulomb: D,
@@ -96,7 +96,7 @@ impl<D: Number> StribeckLaw<D> {
 
     /// The largest friction at rest in N: `F_s`, rounded exactly as `magnitude(0.0)` is.
     ///
-    /// As both are the same number, rounding never starts a cart that breaks away backward.
+    /// As both are the same number, rounding never moves a cart against the force that breaks it away.
     pub(crate) fn limit(&self) -> D {
         self.coulomb + self.excess
     }

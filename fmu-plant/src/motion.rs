@@ -98,9 +98,9 @@ pub(crate) struct Motion {
     state: State,
     regime: Regime,
     suggested_step: f64,
-    /// Whether [`Motion::advance`] integrates the motion. An importer does if not.
+    /// Whether [`Motion::advance`] integrates the motion; otherwise an importer does.
     advances: bool,
-    /// The interval that ended at an event, if the last one did.
+    /// The last interval, if it ended at an event.
     interrupted: Option<Interrupted>,
     #[serde(skip)]
     memory: Memory,
@@ -402,7 +402,7 @@ enum Progress {
     NotFinite,
 }
 
-/// Factor from the length of a step with this squared scaled error to the next one.
+/// The length of the next step divided by that of a step with this squared scaled error.
 fn growth(squared_error: f64) -> f64 {
     if squared_error.is_finite() {
         (0.9 * libm::pow(squared_error, -0.1)).clamp(0.2, 5.0)

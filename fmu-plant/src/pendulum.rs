@@ -42,7 +42,7 @@ pub struct FrictionPendulum {
     regime: i32,
 }
 
-/// The force that `u` and `f_a` exert together, as a polynomial of time, whose inputs were set at `start` in s.
+/// The force `u + f_a` as a polynomial of time; the inputs were set at `start` in s.
 fn force(model: &FrictionPendulum, start: f64) -> Force {
     let [slope, curvature] =
         [0, 1].map(|order| model.u_derivatives[order] + model.f_a_derivatives[order]);

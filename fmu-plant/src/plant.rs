@@ -18,7 +18,7 @@ pub(crate) struct Plant<'a> {
 
 /// The first event inside an integration step, estimated by the continuous extension.
 pub(crate) struct Crossing {
-    /// The part of the step after which the event has happened.
+    /// The fraction of the step after which the event has happened.
     pub(crate) fraction: f64,
     /// The direction of sliding before a stop or after a break-away.
     pub(crate) direction: Regime,

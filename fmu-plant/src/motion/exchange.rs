@@ -24,10 +24,10 @@ const NOMINAL_ACCELERATION: f64 = 1.0;
 /// A cart that slides at most this fast, in m/s, and becomes slower has stopped.
 const REST: f64 = 1e-8 * NOMINAL_VELOCITY;
 
-/// The largest such velocity in event mode, in m/s: the importer may have located the stop a little too early.
+/// The same velocity in event mode, in m/s: larger, because the importer may locate the stop a little too early.
 const LANDING: f64 = 10.0 * REST;
 
-/// How far the force on a held cart exceeds the static friction at its break-away, as part of the
+/// How far the force on a held cart exceeds the static friction at its break-away, as a fraction of the
 /// static friction: more than an importer's integration errors, which would free the cart at once.
 const EXCESS: f64 = 1e-6;
 
@@ -74,9 +74,8 @@ impl<'a> Instant<'a> {
         self.plant.margin(Regime::Stick, direction, 0.0, &self.motion.state)
     }
 
-    /// The regime of a cart at rest. It moves where the force exceeds the static friction by half of
-    /// the excess of continuous-time mode, so that a break-away located a little too early happens,
-    /// too.
+    /// The regime of a cart at rest. The cart moves if the force exceeds the static friction by half of the
+    /// excess at which the indicators break it away, so that a break-away located a little too early happens.
     fn regime_at_rest(&self) -> Regime {
         let leaves = |direction: &Regime| self.held(*direction) < -0.5 * self.excess;
         [Regime::Forward, Regime::Backward].into_iter().find(leaves).unwrap_or(Regime::Stick)
@@ -96,13 +95,13 @@ impl<'a> Instant<'a> {
 impl Motion {
     /// The event indicators in the present regime; indicators not in use are one.
     ///
-    /// First the stop of a sliding cart: with the velocity `v` and the acceleration `a` in its direction, each relative
-    /// to its nominal value, `max(v - r, min(a, v + r))` with `r` = 1e-8. Not positive are a velocity of at most `r`
-    /// that falls, and one below `-r`: a cart that has just broken away, at `v = 0`, has `a > 0`. Without static
-    /// friction `v + r`. Then the friction that is left before a held cart breaks away forward and backward, relative
-    /// to the static friction, and more by `EXCESS`.
+    /// The first is for the stop of a sliding cart: `max(v - r, min(a, v + r))` with `r` = 1e-8 and with its velocity
+    /// `v` and acceleration `a` in its direction, relative to their nominal values; without static friction `v + r`. It
+    /// is not positive if `v <= r` and `a <= 0`, or if `v <= -r`. A cart that has just broken away has `v = 0` and
+    /// `a > 0`. The other two are for a held cart: the friction that is left before it breaks away forward or backward,
+    /// plus the excess at a break-away, relative to the static friction.
     ///
-    /// After [`Motion::settle`] under the same force all are positive.
+    /// After [`Motion::settle`] under the same force, all indicators are positive.
     pub(crate) fn indicators(&self, parameters: &Parameters, force: f64) -> [f64; INDICATORS] {
         let now = Instant::new(self, parameters, force);
         if self.regime == Regime::Stick {

@@ -146,7 +146,7 @@ fn the_result_does_not_depend_on_how_the_interval_is_cut() {
         let milli = by(&|_| 1e-3);
         let uneven = by(&|k| 7e-3 * (1.0 + 0.9 * f64::from(k).sin()));
         let whole = by(&|_| 1.0);
-        // The first stop, at 25 ms, lies among the microsecond steps.
+        // The first stop, at 25 ms, is in one of the microsecond steps.
         let micro = by(&|k| if k < 50_000 { 1e-6 } else { 1e-3 });
         for other in [uneven, whole, micro] {
             for (one, other) in milli.iter().zip(other) {

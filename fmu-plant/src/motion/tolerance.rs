@@ -5,7 +5,7 @@ use crate::parameters::{Refusal, require};
 use fmu::solver::Step;
 use serde::{Deserialize, Serialize};
 
-/// The part of the tolerance that the error of one step may reach.
+/// The fraction of the tolerance that the error of one step may reach.
 ///
 /// The upright pendulum multiplies an early error by some 7e4 in 2 s.
 const SAFETY: f64 = 0.1;

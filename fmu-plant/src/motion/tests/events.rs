@@ -42,7 +42,7 @@ fn the_rise_of_the_friction_just_before_a_stop_is_not_stepped_over() {
 
 #[test]
 fn a_slide_that_nearly_stops_feels_the_rise_of_the_friction() {
-    // Without the rise the velocity would be 3e-5 + 2 (t - 0.3)² and three times v_s at least.
+    // With a constant friction of 5 N the velocity would be 3e-5 + 2 (t - 0.3)², at least 3 v_s.
     let p =
         Parameters { static_friction: 20.0, stribeck_velocity: 1e-5, ..sliding_block(2.0, 5.0) };
     let force = Force { value: 5.0, slope: 8.0, curvature: 0.0, start: 0.3 };
@@ -155,7 +155,7 @@ fn a_peak_of_the_force_inside_one_step_frees_the_cart() {
 
 #[test]
 fn a_short_rest_inside_one_step_is_not_missed() {
-    // u - F_c = 400 s² - 2 with s = t - 0.1: a cart that did not rest would go back at up to
+    // u - F_c = 400 s² - 2 with s = t - 0.1: if the rest were missed, the cart would go back at up to
     // 0.011 m/s, and forward again before the end.
     let p = sliding_block(1.0, 1.0);
     let force = Force { value: -1.0, slope: 0.0, curvature: 800.0, start: 0.1 };

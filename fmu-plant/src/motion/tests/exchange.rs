@@ -33,7 +33,7 @@ fn a_velocity_that_dies_out_exponentially_ends_in_rest_and_stays_there() {
             }
         }
         let [(time, true)] = events[..] else { panic!("one event expected: {events:?}") };
-        // ln(0.3 / 1e-9) / 2, and what the Euler steps make of it.
+        // ln(0.3 / 1e-9) / 2 = 9.76 s, up to the error of the Euler steps.
         assert!((9.7..10.0).contains(&time), "{time}");
         assert_eq!((motion.regime(), motion.state()[2].to_bits()), (Regime::Stick, 0));
     }

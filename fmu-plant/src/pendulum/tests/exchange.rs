@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// The velocity in m/s at which a cart that slows down counts as stopped, and its indicator's scale.
+/// The velocity in m/s at which a cart that slows down counts as stopped, and the nominal velocity.
 const REST: f64 = 1e-9;
 const NOMINAL: f64 = 0.1;
 
@@ -63,7 +63,7 @@ fn integrate(model: &mut FrictionPendulum, duration: f64, step: f64) -> Vec<(i32
     events
 }
 
-/// Follows holds of the force of 0.1 s as an importer and by steps of our own; the events.
+/// Compares the motion of an importer with that of the model's own steps, each force held 0.1 s; returns the events.
 fn compare(linearised: bool, initial: [f64; 4], forces: &[f64]) -> Vec<(i32, i32)> {
     let fresh = || {
         started(|model| {

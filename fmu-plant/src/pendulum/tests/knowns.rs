@@ -35,13 +35,13 @@ pub(super) fn field<'a>(model: &'a mut FrictionPendulum, name: &str) -> &'a mut 
 pub(super) const UNKNOWNS: [&str; 7] =
     ["f_fric", "der(v_p)", "der(omega)", "x_p", "theta", "v_p", "omega"];
 
-/// Their values, or their derivatives in a direction.
+/// The values of [`UNKNOWNS`], or their derivatives in a direction.
 pub(super) fn unknowns(model: &FrictionPendulum) -> [f64; 7] {
     let [x, angle, velocity, rate] = *model.motion.state();
     [model.f_fric, model.slope[2], model.slope[3], x, angle, velocity, rate]
 }
 
-/// The unknowns after a known was moved by `shift`, the regime being what it is.
+/// The unknowns after a known was moved by `shift`, in the same regime.
 pub(super) fn moved_at_a_point(model: &FrictionPendulum, known: &str, shift: f64) -> [f64; 7] {
     let mut model = model.clone();
     *field(&mut model, known) += shift;

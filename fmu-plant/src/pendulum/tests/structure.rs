@@ -11,7 +11,7 @@ use crate::pendulum::variables::{CART, DEPENDS, FRICTION_INITIALLY};
 
 type Found = [BTreeSet<String>; 7];
 
-/// Notes which unknowns are other than before.
+/// Records which unknowns the change of `known` has changed.
 fn note(actual: &mut Found, known: &str, before: &[f64; 7], after: &[f64; 7]) {
     for (k, names) in actual.iter_mut().enumerate() {
         if before[k].to_bits() != after[k].to_bits() {
