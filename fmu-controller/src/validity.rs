@@ -45,7 +45,7 @@ pub(crate) struct MeasurementCheck {
 }
 
 impl MeasurementCheck {
-    /// The check of the measurements of `design`; `None` if none has a range or a longest time of a hold.
+    /// The check of the measurements of `design`; `None` if none has a range or a longest hold.
     pub(crate) fn new(design: &Design) -> Option<Self> {
         if !design.checks_measurements() {
             return None;

@@ -31,7 +31,7 @@ pub(super) struct Controller {
     /// D, the direct term of the commands in the measurements, if there is one.
     pub(super) d: Option<DMatrix<f64>>,
     pub(super) f_a: DMatrix<f64>,
-    /// The identity where faults are constant.
+    /// `A_f`; the identity if faults are constant.
     pub(super) a_f: DMatrix<f64>,
     pub(super) constant_faults: bool,
     pub(super) k_x: DMatrix<f64>,
@@ -192,17 +192,17 @@ impl Controller {
         self.reconfiguration.as_ref().and_then(|reconfiguration| reconfiguration.matrices(matrix))
     }
 
-    /// Whether a measurement has a range or a longest time of a hold.
+    /// Whether a measurement has a range or a longest hold.
     pub(super) fn checks_measurements(&self) -> bool {
         self.measurements.iter().any(|signal| signal.limits.is_some()) || self.limits_holds()
     }
 
-    /// Whether a measurement has a longest time of a hold.
+    /// Whether a measurement has a longest hold.
     pub(super) fn limits_holds(&self) -> bool {
         self.most_held.iter().any(Option::is_some)
     }
 
-    /// Whether the detection counts the samples since the controller rested, beside those since the start.
+    /// Whether the detection counts the samples since the controller last rested, in addition to those since the start.
     pub(super) fn counts_since_rest(&self) -> bool {
         self.limits_holds() && self.detection.is_some()
     }

@@ -261,13 +261,13 @@ impl Design {
         }
     }
 
-    /// Whether a measurement has a range or a longest time of a hold.
+    /// Whether a measurement has a range or a longest hold.
     #[must_use]
     pub fn checks_measurements(&self) -> bool {
         self.measurements.iter().any(|signal| signal.range.is_some()) || self.limits_holds()
     }
 
-    /// Whether a measurement has a longest time of a hold.
+    /// Whether a measurement has a longest hold.
     #[must_use]
     pub fn limits_holds(&self) -> bool {
         self.measurements.iter().any(|signal| signal.longest_hold.is_some())
@@ -281,7 +281,7 @@ impl Design {
 
     /// Copies the design without its schedule, as a place for the matrices and the operating point at one value of the
     /// scheduling variable; `None` if there is no schedule.
-    // Compiled with its caller: a module for browsers then has the code that copies a design once.
+    // Inlined, so that a WebAssembly module contains the code that copies a design only once.
     #[inline]
     #[must_use]
     pub fn unscheduled(&self) -> Option<Self> {

@@ -1,6 +1,7 @@
 //! A controller whose matrices and operating point depend on a scheduling variable.
 //!
-//! A sampled controller interpolates at each sample, a continuous one at each instant. Theta is limited to the grid:
+//! A sampled controller interpolates at each sample, a continuous one at each instant. The scheduling variable theta is
+//! limited to the grid theta_0, theta_1, ..., at whose points the matrices M_i are stated:
 //!
 //! ```text
 //! M(theta) = (1 - t) M_i + t M_{i+1},  t = (theta - theta_i) / (theta_{i+1} - theta_i)
@@ -16,7 +17,7 @@ use crate::design::schedule::Schedule;
 /// The place of a value in the grid.
 #[derive(Clone, Copy)]
 struct Place {
-    /// The interval, from 0, and the fraction of it below the value.
+    /// The interval, counted from 0, and the fraction of the interval that is below the value.
     interval: usize,
     part: f64,
     /// Whether the value is within the grid, ends included.
@@ -24,7 +25,7 @@ struct Place {
 }
 
 impl Schedule {
-    /// The position of the measurement that is the scheduling variable; `None` if an input of its own is.
+    /// The position of the measurement that is the scheduling variable; `None` if it is an input of its own.
     #[must_use]
     pub fn measurement(&self, design: &Design) -> Option<usize> {
         design.measurements.iter().position(|signal| signal.name == self.variable)

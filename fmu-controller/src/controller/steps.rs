@@ -107,7 +107,7 @@ impl AsoController {
         self.detector.get_or_insert_default()
     }
 
-    /// The check of the measurements; an empty one without ranges and longest times of holds.
+    /// The check of the measurements; an empty one without ranges and longest holds.
     pub(crate) fn measurement_check_mut(&mut self) -> &mut MeasurementCheck {
         self.measurement_check.get_or_insert_default()
     }

@@ -96,7 +96,7 @@ impl Design {
             let text = "schedule and sliding_mode are stated, expected one of them";
             return Some(text.to_owned());
         }
-        // Its equations are integrated: no function of a whole step checks measurements or computes residuals.
+        // The exporter integrates such a controller, which has no whole steps in which to check or test measurements.
         if self.sample_time.is_none() && (self.checks_measurements() || self.detection.is_some()) {
             let text = "schedule is stated together with detection, or with range or longest_hold of a measurement; \
                         expected sample_time, too";
@@ -444,7 +444,7 @@ impl Design {
                 let what = format!("range of {name} from {low} to");
                 return Some(Refusal::new(what, high, "two finite numbers, the smaller one first"));
             }
-            // A schedule has its own operating points.
+            // The operating points of a schedule are in its points.
             let operating = signal.operating.unwrap_or(0.0);
             if self.schedule.is_none() && !(low..=high).contains(&operating) {
                 let what = format!("operating of {name}");
