@@ -216,7 +216,7 @@ fn test(detection: &Detection, residuals: &[Counted]) {
     }
 }
 
-/// Bytes of a controller, program code aside.
+/// Bytes of a controller without its program code.
 pub(super) struct Memory {
     /// One instance.
     pub(super) state: usize,

@@ -23,7 +23,7 @@ use super::{Precision, Request};
 const WIDTH: usize = 100;
 /// The file of C code that is the same for each design.
 const RUNTIME: &str = "aso_controller.h";
-/// Its text, which takes the samples.
+/// The text of this file, whose functions compute a sample.
 const RUNTIME_TEXT: &str = include_str!("../runtime/aso_controller.h");
 
 /// The data of the files: the request, the controller, its identifiers.
@@ -37,7 +37,7 @@ struct Source<'a> {
     capital: String,
 }
 
-/// Returns the header, the source file and the file that takes the samples, with their names.
+/// Returns the header, the source file and [`RUNTIME`], with their names.
 pub(super) fn files(
     request: &Request<'_>,
     controller: &Controller,

@@ -14,7 +14,7 @@ pub(super) struct Constants {
     pub(super) rows: Kind,
     /// The signals of the columns of a matrix; none of a vector.
     pub(super) columns: Option<Kind>,
-    /// What there is a matrix for: each point of a schedule, or each set of gains; none for one matrix.
+    /// The kind of parts that have one matrix each: points of a schedule, or sets of gains; `None` for one matrix.
     pub(super) layers: Option<Kind>,
     /// The rows of all matrices; one row for a vector.
     pub(super) values: Vec<Vec<f64>>,

@@ -45,7 +45,7 @@ pub enum Language {
 pub enum Precision {
     /// 64 bits: the results have the bits of the FMU.
     Double,
-    /// 32 bits: the code states a bound of the difference, if there is one.
+    /// 32 bits: the code states a bound of the difference to 64 bits, if there is one.
     Single,
 }
 
@@ -81,8 +81,8 @@ impl Precision {
 pub struct Code {
     /// The files: their paths, relative to a folder, and their contents.
     pub files: Vec<(PathBuf, String)>,
-    /// Sentences on what single precision may do to the loop, or why there is no bound of it; empty in double
-    /// precision.
+    /// Sentences on what single precision may do to the loop, or why the rounding errors have no bound; empty in
+    /// double precision.
     pub warnings: Vec<String>,
 }
 

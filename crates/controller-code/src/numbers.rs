@@ -226,7 +226,7 @@ impl Vector {
 }
 
 impl Matrix {
-    /// The matrix of a controller, if it states it: `A_f` not where faults are constant.
+    /// The matrix, if the controller states it; no `A_f` if faults are constant.
     fn stated(self, controller: &Controller) -> Option<&nalgebra::DMatrix<f64>> {
         self.of(controller).filter(|_| self != Self::AF || !controller.constant_faults)
     }

@@ -27,7 +27,7 @@ pub(super) struct Case {
     pub(super) stuck_at: f64,
     /// For each state of the fault model whether its estimate restarts at 0 when the actuator fails or comes back.
     pub(super) restarts: Vec<bool>,
-    /// The loss that decides; none if only an input reports the actuator.
+    /// The decision by an estimated loss; `None` if only an input reports the actuator.
     pub(super) decision: Option<Decision>,
 }
 
@@ -36,9 +36,9 @@ pub(super) struct Case {
 pub(super) struct Decision {
     /// The position of the loss.
     pub(super) loss: usize,
-    /// The fraction above which it must be.
+    /// The fraction of the command that the loss must exceed.
     pub(super) fraction: f64,
-    /// The number of samples for which it must be above.
+    /// The number of samples for which the loss must exceed it.
     pub(super) samples: u32,
 }
 
@@ -140,7 +140,7 @@ impl Reconfiguration {
         self.sets.len() * actuators + if self.cases.is_empty() { 0 } else { singles + of_cases }
     }
 
-    /// The largest number of actuators that a set does without.
+    /// The largest number of actuators that are gone in a set.
     pub(super) fn most_gone(&self) -> usize {
         let count = |set: &GainSet| set.gone.iter().filter(|gone| **gone).count();
         self.sets.iter().map(count).max().unwrap_or(0)
@@ -192,7 +192,7 @@ fn decision(
     let (Some(fraction), Some(time)) = (case.loss, case.time) else { return Ok(None) };
     let of_actuator = |loss: &Loss| loss.actuator == case.actuator;
     let Some(loss) = losses.iter().position(of_actuator) else { return Ok(None) };
-    // The smallest whole number of samples that last as long, with the tolerance of the FMU.
+    // The smallest whole number of samples that last for `time`, with the tolerance of the FMU.
     let least = time * (1.0 - 1e-9);
     let mut samples = (least / period).floor().max(0.0);
     let most = f64::from(u32::MAX);

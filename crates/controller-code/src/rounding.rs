@@ -15,11 +15,11 @@
 //! d[k+1] = A d[k] + B w[k],   [du; df_hat] = C d[k] + D w[k],   d = [dx; dx_hat; df_hat]
 //! ```
 //!
-//! so that G kappa s bounds the differences of the outputs, with the peak-to-peak gains G of that system.
+//! for the differences d, du and df_hat from exact arithmetic. With the peak-to-peak gains G of this system, G kappa s
+//! bounds the differences of the outputs u and f_hat.
 //! The bound holds in the loop of the design, while faults are compensated and no command is at a limit.
-//! The signals are those of single precision. If the differences of all of them, x_hat and y included, are at most
-//! M s and the spectral radius of M is below 1, the signals of double precision bound those of single precision:
-//! rounding does not make the loop unstable.
+//! s has the signals of single precision. If all their differences are at most M s and the spectral radius of M is
+//! below 1, they are bounded by the signals of double precision: rounding does not make the loop unstable.
 //! The residuals r of a detection are further outputs, and x_r is part of d; their size follows from those of y
 //! and u. The bound takes the worst case of every rounding; errors of both signs cancel in practice. A scheduled loop
 //! is not such a system, and has no bound.
@@ -50,7 +50,7 @@ use super::text::{aligned, filled};
 
 /// A factor of the bound that covers products of rounding errors, and the rounding of its printed digits.
 const SECOND_ORDER: f64 = 1.001;
-/// The relative width of the peak gains.
+/// The relative width to which the peak gains are enclosed.
 const WIDTH: f64 = 0.02;
 /// The largest order of the loop whose peak gains are computed.
 const LARGEST_ORDER: usize = 60;

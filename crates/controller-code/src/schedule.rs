@@ -6,7 +6,7 @@
 //! M(theta) = (1 - t) M_i + t M_{i+1},  t = (theta - theta_i) / (theta_{i+1} - theta_i)
 //! ```
 //!
-//! with theta limited to the grid, as `aso_controller::design::schedule::Schedule::interpolate` does.
+//! with the scheduling variable theta limited to the grid, as in `Schedule::interpolate` of `aso_controller`.
 
 use aso_controller::design::{self, schedule};
 use nalgebra::DMatrix;

@@ -153,7 +153,7 @@ macro_rules! kinds {
     };
 }
 
-// Each kind with the name of its number.
+// Each kind with the name of the constant with the number of its members.
 kinds! {
     State "STATES",
     Fault "FAULTS",

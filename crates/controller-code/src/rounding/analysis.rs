@@ -20,7 +20,7 @@ pub(super) struct Analysis<'a> {
     state_of_filter: DMatrix<f64>,
     /// The vectors in the order in which they are computed; the last entry of a vector is the present one.
     history: Vec<(Vector, Elements)>,
-    /// kappa: a row over the signals for each error.
+    /// kappa: for each error a row with the coefficients of the signals.
     errors: Vec<RowDVector<f64>>,
     /// The inputs v of a sliding-mode law.
     chords: Vec<Chord>,
@@ -28,7 +28,7 @@ pub(super) struct Analysis<'a> {
 
 /// An input v of a sliding-mode law.
 struct Chord {
-    /// The position of its row among the errors, which is zero.
+    /// The position of its row, of zeros, in `errors`.
     position: usize,
     /// Half of the largest slope of a chord, rho / (2 delta).
     half_slope: f64,
@@ -106,8 +106,8 @@ impl<'a> Analysis<'a> {
         2 * n + q + t + k
     }
 
-    /// The number of columns of forms, with room for the errors of 6 vectors of each kind and for v, and that of
-    /// signals with 1.
+    /// The numbers of columns: of forms, with room for the errors of 6 vectors of each kind and for v; of magnitudes,
+    /// for the signals and 1.
     fn widths(&self) -> Widths {
         let signals: usize = Kind::ALL.map(|kind| self.count(kind)).iter().sum();
         let detection = self.count(Kind::ResidualState) + self.count(Kind::Residual);
@@ -309,7 +309,7 @@ impl<'a> Analysis<'a> {
         self.record_all(&mut vectors, [Vector::XValue, Vector::FValue, Vector::U]);
         vectors.signals().set_command_values(&design);
         self.record_all(&mut vectors, [Vector::Command]);
-        // Without limits u - v is exactly zero.
+        // No command is at a limit, so the change by the limits is exactly zero.
         vectors.get_mut(Vector::Excess).fill(Rounded::zero());
         vectors.signals().predict_states(&design);
         vectors.signals().predict_faults(&design, true);
@@ -338,8 +338,8 @@ impl<'a> Analysis<'a> {
         }
     }
 
-    /// Does the same for the vector `meaning`, which the equations store in `place`; nothing if the design does not
-    /// have it.
+    /// Same as [`Self::record_all`] for the vector `meaning`, which the equations store in `place`; does nothing if the
+    /// design does not have it.
     fn record_as(&mut self, vectors: &mut Vectors<Rounded>, place: Vector, meaning: Vector) {
         let numbers = vectors.get_mut(place);
         if numbers.is_empty() {
@@ -349,7 +349,7 @@ impl<'a> Analysis<'a> {
         numbers.clone_from_slice(&self.get(meaning).numbers());
     }
 
-    /// Sets rho s / (|s| + delta): half the largest slope times s, plus v.
+    /// Sets `injected` to rho s / (|s| + delta): half the largest slope times s, plus v.
     fn inject(&mut self, injected: &mut Elements) {
         let Some(SlidingMode { rho, delta }) = &self.controller.sliding_mode else { return };
         let s = self.get(Vector::S);

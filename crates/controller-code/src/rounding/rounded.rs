@@ -41,7 +41,7 @@ impl Elements {
     pub(super) fn of(numbers: &[Rounded], widths: Widths) -> Self {
         let mut elements = Self::zero(numbers.len(), widths);
         for (i, number) in numbers.iter().enumerate() {
-            // A constant is a sum of products with 0, which is 0.
+            // An element that is a constant is a sum of products with 0, so it is 0.
             let Rounded::Signal(element) = number else { continue };
             elements.form.row_mut(i).copy_from(&element.form);
             elements.magnitude.row_mut(i).copy_from(&element.magnitude);
