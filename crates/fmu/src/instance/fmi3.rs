@@ -29,7 +29,7 @@ pub(crate) struct Session {
     event_mode_used: bool,
     early_return_allowed: bool,
     intermediate: Option<Box<Intermediate>>,
-    /// Places of the variables of the present call.
+    /// The places ([`Table`]) of the variables of the present call.
     places: Vec<u32>,
     /// Orders of the output derivatives of the present call.
     integers: Vec<i32>,
@@ -213,8 +213,8 @@ impl<M: Model> Instance<M> {
         self.session()?.table.dependencies(reference, initial)
     }
 
-    /// Finds the places of the elements of variables of one type, in row-major order, and runs `body` with them. An
-    /// error for a variable of another type, and if there are not `count` elements.
+    /// Finds the places ([`Table`]) of the elements of variables of one type, in row-major order, and runs `body` with
+    /// them. An error for a variable of another type, and if there are not `count` elements.
     pub(crate) fn located(
         &mut self,
         kind: NativeType,

@@ -53,9 +53,9 @@ const fn number(bytes: &[u8]) -> u64 {
 struct LayoutHasher(u64);
 
 impl LayoutHasher {
-    /// Adds a number to the hash by a bijection of the former hash. A difference between two hashes
-    /// persists unless a later difference cancels it (probability 2^-64). The factor is the odd number
-    /// next to 2^64 divided by the golden ratio.
+    /// Adds a number to the hash by a bijection of the hash. So a difference between two hashes persists unless
+    /// a later difference cancels it (probability 2^-64). The factor is the odd number next to 2^64 divided by
+    /// the golden ratio.
     fn add(&mut self, number: u64) {
         let product = (self.0 ^ number).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         self.0 = product ^ (product >> 32);

@@ -1,6 +1,5 @@
 //! The variables of FMI 3.0, derived from those of FMI 2.0: value references that are unique over all
-//! types, arrays, and event indicators as variables. The place of a scalar is its value reference in FMI 2.0 with
-//! the mark of an `Int64`, or the number of an event indicator with its mark.
+//! types, arrays, and event indicators as variables.
 
 mod arrays;
 mod describe;
@@ -30,6 +29,9 @@ pub(crate) struct Entry {
 }
 
 /// The variables by value reference of FMI 3.0, and what they depend on.
+///
+/// Each scalar has a place: its value reference of FMI 2.0, with a mark for an `Int64`, or the number of an event
+/// indicator, with a mark.
 pub(crate) struct Table {
     entries: Vec<Entry>,
     /// `ModelStructure` of FMI 2.0, in which each element of an array is a variable.

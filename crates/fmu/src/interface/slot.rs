@@ -20,7 +20,7 @@ pub(crate) struct Slot<M, T> {
     pub(crate) is_initial_unknown: bool,
     /// Smallest and largest value of a Real or Integer; finite.
     pub(crate) range: (f64, f64),
-    /// The states in which the variable may be set: a set of
+    /// The states of an instance in which the variable may be set: a set of
     /// [`State::bit`](fmu_description::call_order::State)s.
     pub(crate) settable: u16,
     /// The values of an enumeration; empty for all other types.

@@ -10,7 +10,7 @@ use fmu_description::{
 
 /// The Rust type of the values of such a type.
 pub(crate) trait Native: Clone + Sized + 'static {
-    /// The type of FMI 3.0.
+    /// The type of FMI 3.0 for values of this Rust type.
     const TYPE: NativeType;
 
     /// Returns the variables of this type.

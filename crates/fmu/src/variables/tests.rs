@@ -1,4 +1,4 @@
-//! The descriptions that derived tables give.
+//! Model descriptions from derived tables of variables.
 
 use std::path::Path;
 

@@ -105,7 +105,7 @@ fn states_are_integrated_and_time_events_happen_at_their_times() {
             time += size;
         }
         let model = &instance.core.model;
-        // Samples at 0, 0.3, 0.6 and 0.9 s.
+        // The samples at 0, 0.3, 0.6 and 0.9 s.
         assert_eq!(model.samples, 4);
         assert!((model.x - 2.0).abs() < 1e-14 && (model.y - 1.8).abs() < 1e-14, "{}", model.y);
     }
