@@ -46,22 +46,22 @@ pub struct AsoController {
     operating_point: OperatingPoint,
     /// The signals as deviations from the operating point.
     pub(crate) deviations: Signals,
-    /// z'; see `with_slopes`.
+    /// z', the derivative of the estimates; `with_slopes` computes the derivatives.
     pub(crate) z_slopes: Vec<f64>,
-    /// f_hat' of a design with a direct term; empty in others.
+    /// f_hat', the derivative of the estimated faults, in a design with a direct term; empty in others.
     pub(crate) f_slopes: Vec<f64>,
-    /// u'.
+    /// u', the derivative of the commands.
     pub(crate) u_slopes: Vec<f64>,
-    /// Whether z', f_hat', u' and E_hat' belong to `deviations` and `mode`.
+    /// Whether the derivatives z', f_hat', u' and E_hat' are those at `deviations` and `mode`.
     #[serde(skip)]
     has_slopes: bool,
     pub(crate) compensate: bool,
-    /// E_hat with its derivative.
+    /// The estimated losses of effectiveness E_hat with their derivatives.
     pub(crate) losses: Vec<Loss>,
     /// Which actuators are gone.
     pub(crate) reconfigurator: Reconfigurator,
-    /// The mode of u and z'. Whether it compensates is decided at the start, at the end of each step
-    /// and at events; in a sampled controller at each sample.
+    /// The mode for which u and z' are computed. Whether it compensates is decided at the start, at the end of
+    /// each step and at events; in a sampled controller at each sample.
     mode: Mode,
     /// Whether a channel reaches or leaves a limit at events only, as in model exchange.
     frozen: bool,
@@ -83,7 +83,7 @@ pub struct AsoController {
     schedule_value: f64,
     /// `schedule_value` limited to the grid of the schedule.
     pub(crate) schedule_at: f64,
-    /// Co-simulation of a continuous controller with a schedule: the exporter integrates its equations.
+    /// Whether the exporter integrates the equations: in co-simulation of a continuous controller with a schedule.
     is_integrated: bool,
     /// Whether a value outside of the schedule was reported.
     outside_reported: bool,

@@ -41,7 +41,7 @@ const MOST_SAMPLES: f64 = 1e7;
 /// State and outputs of the detection.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Detector {
-    /// [x_r; q], q in a continuous controller only.
+    /// [x_r; q]: the state of the filter and, in a continuous controller, the integrals of the residuals.
     state: Vec<f64>,
     /// Start of the run, or end of the last rest, in s.
     start: f64,

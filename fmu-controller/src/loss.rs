@@ -22,9 +22,9 @@ pub(crate) struct Loss {
     pub(crate) fault: usize,
     /// Position of the actuator.
     pub(crate) actuator: usize,
-    /// u_e.
+    /// u_e, the command at which the estimate is half of the loss.
     least_command: f64,
-    /// E_hat.
+    /// The estimated loss E_hat.
     pub(crate) estimate: f64,
     /// The derivative of E_hat with respect to time.
     pub(crate) slope: f64,

@@ -7,9 +7,9 @@ use aso_controller::design::{Design, GainSet};
 /// The switches of the equations: while the mode stays, all equations are linear.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Mode {
-    /// K_f f_hat is part of the command.
+    /// Whether the commands compensate the faults: K_f f_hat is part of them.
     pub(crate) compensating: bool,
-    /// f_hat follows the observer.
+    /// Whether the faults are estimated; otherwise f_hat is held.
     pub(crate) estimating: bool,
     /// Bit j: channel j is at its lower limit.
     pub(crate) lower: u64,

@@ -62,12 +62,12 @@ impl Propagators {
 #[derive(Clone)]
 pub(crate) struct Observer {
     propagators: Propagators,
-    /// Space for [y; r; w] and its slope.
+    /// Space for the inputs [y; r; w] and their slopes.
     input: Vec<f64>,
     input_slope: Vec<f64>,
-    /// Space for [y; r].
+    /// Space for the measurements and references [y; r].
     known: Vec<f64>,
-    /// z at the start and at the end of a part of a step.
+    /// The estimates z at the start and at the end of a part of a step.
     before: Vec<f64>,
     after: Vec<f64>,
 }
@@ -75,9 +75,9 @@ pub(crate) struct Observer {
 /// A part of a communication step.
 #[derive(Clone, Copy)]
 pub(crate) struct Part {
-    /// Its start in s after the start of the step.
+    /// The start of the part, in s after the start of the step.
     pub(crate) offset: f64,
-    /// Its length in s.
+    /// The length of the part in s.
     pub(crate) size: f64,
 }
 

@@ -8,7 +8,7 @@ use aso_controller::design::Design;
 /// The signals as the importer sees them.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Values {
-    /// z = [x_hat; f_hat; y_f; x_i; u_t].
+    /// The estimates z = [x_hat; f_hat; y_f; x_i; u_t].
     pub(crate) z: Vec<f64>,
     /// The measurements, and their derivatives with respect to time.
     pub(crate) y: Vec<f64>,
@@ -35,7 +35,7 @@ pub(crate) struct OperatingPoint {
 /// The signals of the equations: deviations from the operating point, or a direction in them.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Signals {
-    /// z = [x_hat; f_hat; y_f; x_i; u_t].
+    /// The estimates z = [x_hat; f_hat; y_f; x_i; u_t].
     pub(crate) z: Vec<f64>,
     /// The measurements.
     pub(crate) y: Vec<f64>,
@@ -147,7 +147,7 @@ impl Values {
         }
     }
 
-    /// Sets z to the operating point, and no law.
+    /// Sets z to the operating point, and removes the law.
     pub(crate) fn rest(&mut self, point: &OperatingPoint) {
         self.law = None;
         for (value, point) in self.z.iter_mut().zip(&point.z) {

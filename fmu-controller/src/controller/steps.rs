@@ -27,9 +27,8 @@ impl AsoController {
         Mode::free(compensating, compensating || self.design.monitor, gone, fallen_back)
     }
 
-    /// Decides at `time` which actuators are gone. The estimates of the faults of those that are gone or
-    /// back since the last decision restart at 0, also in the prediction of `sampler`. Returns whether there are such
-    /// estimates.
+    /// Decides at `time` which actuators are gone. The fault estimates of actuators that are gone or back since the
+    /// last decision restart at 0, also in the prediction of `sampler`. Returns whether an estimate has restarted.
     pub(super) fn reconfigure(&mut self, time: f64, mut sampler: Option<&mut Sampler>) -> bool {
         let Self { design, values, deviations, reconfigurator, losses, .. } = self;
         let changed = reconfigurator.decide(design, losses, time);
@@ -256,7 +255,7 @@ impl AsoController {
         self
     }
 
-    /// Computes z', f_hat', u' and E_hat'.
+    /// Computes the derivatives z', f_hat', u' and E_hat'.
     fn set_slopes(&mut self) {
         let Self { current, values, deviations, z_slopes, f_slopes, u_slopes, mode, .. } = self;
         let design = current.as_deref().unwrap_or(&*self.design);
@@ -282,7 +281,7 @@ impl AsoController {
         }
     }
 
-    /// Computes E_hat.
+    /// Computes the estimated losses E_hat.
     fn set_losses(&mut self) {
         let n = self.design.states.len();
         for loss in &mut self.losses {

@@ -217,7 +217,7 @@ fn commands(design: &Design) -> Vec<Variable> {
         .collect()
 }
 
-/// An element of z.
+/// An element of the estimates z, with its variables.
 struct State {
     position: usize,
     name: String,

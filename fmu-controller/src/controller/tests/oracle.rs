@@ -33,7 +33,7 @@ pub(super) struct Oracle {
     limits: Vec<[f64; 2]>,
 }
 
-/// H, K_i, F_i, L_w, N_r; zero where the design states none.
+/// The matrices H, K_i, F_i, L_w, N_r of the references; zero where the design states none.
 struct Tracking {
     h: DMatrix<f64>,
     k_i: DMatrix<f64>,
@@ -42,7 +42,7 @@ struct Tracking {
     n_r: DMatrix<f64>,
 }
 
-/// x_hat, f_hat, y_f, x_i, u_t.
+/// The estimates x_hat, f_hat, y_f, x_i, u_t.
 #[derive(Clone)]
 pub(super) struct Estimate {
     pub(super) x: Vector,
@@ -53,7 +53,7 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
-    /// All numbers.
+    /// The estimates in one list.
     pub(super) fn all(&self) -> Vec<f64> {
         [&self.x, &self.f, &self.y_f, &self.x_i, &self.u_t].map(Vector::as_slice).concat()
     }
@@ -136,13 +136,13 @@ impl Oracle {
         (Estimate { x, f, y_f: filtered, x_i, u_t }, Vector::from_vec(inputs))
     }
 
-    /// y, and r as deviation, of inputs [y; r].
+    /// Splits inputs [y; r] into y and the deviations of r.
     fn inputs(&self, inputs: &Vector) -> (Vector, Vector) {
         let (p, t) = (self.y_op.len(), self.r_op.len());
         (inputs.rows(0, p).into(), inputs.rows(p, t) - &self.r_op)
     }
 
-    /// f_hat while estimating.
+    /// The estimated faults f_hat while estimating.
     pub(super) fn fault(&self, z: &Estimate, inputs: &Vector) -> Vector {
         match &self.p_f {
             Some(p_f) => &z.f + p_f * self.innovation(z, &self.inputs(inputs).0),
@@ -150,7 +150,7 @@ impl Oracle {
         }
     }
 
-    /// The command, limits ignored.
+    /// The commands without limits.
     fn free(&self, z: &Estimate, inputs: &Vector, on: bool) -> Vector {
         let fault = &self.k_f * self.fault(z, inputs) * f64::from(u8::from(on));
         let Tracking { k_i, n_r, .. } = &self.tracking;
@@ -159,7 +159,7 @@ impl Oracle {
         &self.u_op + &self.k_x * (&z.x - &self.x_op) + fault + reference + left
     }
 
-    /// x_i', without the back-calculation and with it.
+    /// The parts of x_i': without the back-calculation, and the back-calculation.
     fn integral(&self, z: &Estimate, inputs: &Vector, on: bool) -> [Vector; 2] {
         let Tracking { h, f_i, l_w, .. } = &self.tracking;
         let (y, r) = self.inputs(inputs);
@@ -184,7 +184,7 @@ impl Oracle {
         source - &self.y_op - &self.c * (&z.x - &self.x_op)
     }
 
-    /// z' at the inputs [y; r].
+    /// The derivative z' at the inputs [y; r].
     fn rate(&self, z: &Estimate, inputs: &Vector, on: bool) -> Estimate {
         let (y, _) = self.inputs(inputs);
         let (u, e) = (self.command(z, inputs, on), self.innovation(z, &y));

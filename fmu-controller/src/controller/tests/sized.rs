@@ -167,7 +167,7 @@ pub(super) fn sized(of: Shape) -> AsoController {
     controller
 }
 
-/// A number of the controller.
+/// A number of the controller: the name of its variable, and the function that borrows it.
 pub(super) struct Real {
     pub(super) name: String,
     pub(super) field: Box<dyn Fn(&mut AsoController) -> &mut f64>,
@@ -187,7 +187,7 @@ pub(super) fn inputs(controller: &AsoController) -> Vec<Real> {
     measured.chain(referred).collect()
 }
 
-/// Estimates and filtered measurements.
+/// The elements of z.
 fn estimates(controller: &AsoController) -> Vec<Real> {
     let names = names::estimates(&controller.design).enumerate();
     names.map(|(k, name)| real(name, move |model| &mut model.values.z[k])).collect()
@@ -307,7 +307,7 @@ pub(super) fn initial_knowns(controller: &AsoController) -> Vec<Real> {
     all
 }
 
-/// The values of `reals`.
+/// The values of `reals` in `controller`.
 pub(super) fn values(controller: &AsoController, reals: &[Real]) -> Vec<f64> {
     let mut copy = controller.clone();
     reals.iter().map(|real| *(real.field)(&mut copy)).collect()

@@ -117,7 +117,7 @@ fn a_measurement_that_is_lost_ends_at_the_operating_point_and_starts_anew_from_t
     }
 }
 
-/// The longest hold is 10 steps; in seconds since 1970 they are 0.099999905 s.
+/// The longest hold is 10 steps; in seconds since 1970 these last 0.099999905 s.
 #[test]
 fn a_hold_lasts_as_many_steps_in_seconds_since_1970() {
     for start_time in [0.0, 1.7e9] {
