@@ -9,7 +9,7 @@ pub(crate) struct HeldMean {
     integrals: Vec<f64>,
     /// Space for the means.
     means: Vec<f64>,
-    /// The time in s over which the integrals extend.
+    /// The duration in s of the integrals.
     duration: f64,
 }
 

@@ -19,16 +19,16 @@ use carried::{Carrier, Estimate};
 use control::nonlinear_filter::Transform;
 use held_mean::HeldMean;
 
-/// `extended` of the parameter `method`.
+/// The value `extended` of the parameter `method`.
 const EXTENDED: i32 = 1;
-/// `unscented` of the parameter `method`.
+/// The value `unscented` of the parameter `method`.
 const UNSCENTED: i32 = 2;
 
 /// The filter; fields without a comment have the name of their variable.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct KalmanFilter {
-    /// What follows from the files of the FMU; `None` in a template, which has none of them, and between the read of a
-    /// state from bytes and [`Model::complete`].
+    /// What follows from the files of the FMU; `None` in a template, which has no files, and after a state was read
+    /// from bytes until [`Model::complete`].
     #[serde(skip)]
     carrier: Option<Arc<Carrier>>,
     method: i32,

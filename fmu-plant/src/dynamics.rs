@@ -4,7 +4,8 @@ use crate::functions::Functions;
 use crate::number::Number;
 use crate::parameters::Parameters;
 
-/// `[x_p, theta, v_p, omega]` in m, rad, m/s, rad/s; also its derivative.
+/// The state `[x_p, theta, v_p, omega]` in m, rad, m/s, rad/s: position of the cart, angle of the pendulum, and their
+/// velocities; also the derivative of the state.
 pub(crate) type State<D = f64> = [D; 4];
 
 /// The force on the cart without friction, `u + f_a`, as a polynomial of time:

@@ -64,7 +64,7 @@ impl Functions<Dual64> for Direct {
 pub(crate) struct Memory {
     last: Cell<Angle>,
     before: Cell<Angle>,
-    /// Exponent and exponential.
+    /// The last exponent and its exponential.
     exponential: Cell<[f64; 2]>,
 }
 

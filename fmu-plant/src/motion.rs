@@ -138,7 +138,7 @@ struct Interrupted {
 }
 
 impl Default for Motion {
-    /// At rest at the origin.
+    /// The cart at rest at the origin, and the pendulum at rest at the angle 0.
     fn default() -> Self {
         Self {
             state: [0.0; 4],

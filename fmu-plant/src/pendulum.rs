@@ -19,7 +19,7 @@ mod variables;
 #[derive(Clone, Serialize, Deserialize)]
 pub struct FrictionPendulum {
     parameters: Parameters,
-    /// `[x_p_0, theta_0, v_p_0, omega_0]`.
+    /// The initial state `[x_p_0, theta_0, v_p_0, omega_0]`.
     initial: [f64; 4],
     u: f64,
     f_a: f64,

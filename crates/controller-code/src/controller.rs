@@ -15,7 +15,7 @@ use crate::Error;
 /// The controller of a sampled design: matrices, signals, switches. The shapes are those of the design file.
 pub(super) struct Controller {
     pub(super) description: String,
-    /// T in s.
+    /// The sample time T in s.
     pub(super) sample_time: f64,
     pub(super) estimator: Estimator,
     /// Start of the compensation in s, and the first sample at or after it.
@@ -23,7 +23,7 @@ pub(super) struct Controller {
     pub(super) first_compensated: u32,
     /// Whether the fault is estimated while it is not compensated.
     pub(super) monitor: bool,
-    /// The diagonal of W.
+    /// The diagonal of W, the weights of the filter of the measurements.
     pub(super) filter: Option<Vec<f64>>,
     pub(super) a: DMatrix<f64>,
     pub(super) b: DMatrix<f64>,

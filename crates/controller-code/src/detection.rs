@@ -41,9 +41,9 @@ pub(super) enum Method {
 pub(super) struct Test {
     pub(super) name: String,
     pub(super) residuals: usize,
-    /// kappa of the cumulative sums, or 0.
+    /// The drift kappa of the cumulative sums, or 0.
     pub(super) drift: f64,
-    /// The samples of a window, or 0.
+    /// The number of samples in a window, or 0.
     pub(super) window: u32,
     pub(super) threshold: f64,
     /// For each fault whether this test reacts to it.

@@ -50,7 +50,7 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Bytes of a number.
+    /// The number of bytes of a floating-point number.
     fn size(self) -> usize {
         match self {
             Self::Double => 8,

@@ -13,9 +13,9 @@ pub(super) struct Numbers<N> {
     /// The matrices that the controller states.
     matrices: Vec<Entries<N>>,
     filter: Vec<N>,
-    /// w of `u_t`.
+    /// The decay w of `u_t`; empty without a transfer.
     transfer: Vec<N>,
-    /// rho and delta.
+    /// rho and delta of a sliding-mode law; empty without one.
     bounds: [Vec<N>; 2],
     /// The operating point: states, commands, measurements, references.
     point: [Vec<N>; 4],
@@ -184,7 +184,7 @@ impl<N: Number> Vectors<N> {
 pub(super) struct Memory<N> {
     /// `x_hat`, `f_hat`, `y_f`, `x_i`, `u_t`, `u_before`, u.
     stored: [Vec<N>; 7],
-    /// y and r.
+    /// The measurements y and the references r.
     inputs: [Vec<N>; 2],
 }
 

@@ -21,7 +21,7 @@ pub(super) struct Reconfiguration {
 
 /// An actuator that may be gone.
 pub(super) struct Case {
-    /// Its position.
+    /// The position of the actuator.
     pub(super) actuator: usize,
     /// The command at which it is stuck.
     pub(super) stuck_at: f64,

@@ -57,7 +57,7 @@ vectors! {
     FHat "f_hat" Fault,
     /// The integral part of `f_hat` in a law with a direct term.
     FHatI "f_hat_i" Fault,
-    /// `L_f` e of a sliding-mode law.
+    /// The sliding variable `L_f` e of a sliding-mode law.
     S "s" Fault,
     YF "y_f" Measurement,
     U "u" Actuator,
@@ -162,14 +162,14 @@ kinds! {
     Reference "REFERENCES",
     /// The integral of the distance from a reference.
     Integral "REFERENCES",
-    /// No signals: a point of the schedule; of the detection a state of its filter, a residual, a test, a fault
-    /// that it can isolate.
+    /// Kinds that are no signals: points of the schedule; states of the filter of the detection, its residuals, its
+    /// tests, and the faults that it can isolate.
     Point "POINTS",
     ResidualState "RESIDUAL_STATES",
     Residual "RESIDUALS",
     Test "TESTS",
     Suspect "SUSPECTS",
-    /// Of a reconfiguration: a set of gains, an actuator that may be gone.
+    /// Kinds of the reconfiguration: sets of gains, and actuators that may be gone.
     GainSet "GAIN_SETS",
     Case "CASES",
 }

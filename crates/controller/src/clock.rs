@@ -15,11 +15,11 @@ pub fn clock_rounding(time: f64) -> f64 {
 /// The instants start + k T, and the number of the next one.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Clock {
-    /// T in s.
+    /// The period T in s.
     period: f64,
     /// Instant 0 in s.
     start: f64,
-    /// k of the next instant: a whole number, exact up to 2^53.
+    /// The number k of the next instant: a whole number, exact up to 2^53.
     next: f64,
 }
 

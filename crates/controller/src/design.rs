@@ -346,7 +346,7 @@ impl Design {
         self.transfer.map_or(0, |_| self.actuators.len())
     }
 
-    /// The length of z.
+    /// The length of z = [x_hat; f_hat; y_f; x_i; u_t].
     #[must_use]
     pub fn order(&self) -> usize {
         self.transfer_at(self.transfers())

@@ -18,7 +18,7 @@ pub(crate) struct Tolerance {
 }
 
 impl Default for Tolerance {
-    /// Relative 1e-9, absolute 1e-12.
+    /// A relative tolerance of 1e-9, and an absolute one of 1e-12.
     fn default() -> Self {
         Self { relative: 1e-9, absolute: 1e-12 }
     }

@@ -457,7 +457,7 @@ impl<'a> Analysis<'a> {
         }
     }
 
-    /// kappa, errors x signals.
+    /// The matrix kappa of the error bounds kappa s, errors x signals.
     fn kappa(&self) -> DMatrix<f64> {
         DMatrix::from_rows(&self.errors)
     }
