@@ -101,7 +101,7 @@ pub(crate) struct Conditions<'a> {
     pub(crate) y: [&'a [f64]; 2],
     /// The references at the start of the step, and their slopes.
     pub(crate) r: [&'a [f64]; 2],
-    /// The mode without limits.
+    /// The mode with no channel at a limit.
     pub(crate) mode: Mode,
 }
 

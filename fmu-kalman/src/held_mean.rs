@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// The mean over time of values that are held.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct HeldMean {
-    /// The integrals over time.
+    /// The integrals of the values over time.
     integrals: Vec<f64>,
     /// Space for the means.
     means: Vec<f64>,

@@ -32,7 +32,7 @@ pub struct FrictionPendulum {
     tolerance: Tolerance,
     /// The force `u + f_a` in N at the time of the outputs.
     force: f64,
-    /// The derivative of this force in N/s.
+    /// The derivative of `force` in N/s.
     force_rate: f64,
     f_fric: f64,
     /// The derivative of `f_fric` in N/s, which `friction_rate` computes when it is read.

@@ -23,7 +23,7 @@ use super::{Precision, Request};
 const WIDTH: usize = 100;
 /// The file of C code that is the same for each design.
 const RUNTIME: &str = "aso_controller.h";
-/// The text of this file, whose functions compute a sample.
+/// The text of [`RUNTIME`], whose functions compute a sample.
 const RUNTIME_TEXT: &str = include_str!("../runtime/aso_controller.h");
 
 /// The data of the files: the request, the controller, its identifiers.

@@ -207,7 +207,7 @@ impl<N: Number> Memory<N> {
 }
 
 impl Vector {
-    /// The number of its elements; 0 if the design does not have it.
+    /// The number of elements of the vector; 0 if the design does not have it.
     pub(super) fn length(self, controller: &Controller) -> usize {
         let is_stated = match self {
             Self::YF | Self::NextYF | Self::StoredYF => controller.filter.is_some(),

@@ -48,7 +48,7 @@ pub(super) struct GainSet {
     pub(super) gone: Vec<bool>,
     k_x: DMatrix<f64>,
     k_f: DMatrix<f64>,
-    /// Actuators x actuators; 0 in the columns of those that are not gone.
+    /// `K_s`, actuators x actuators; the columns of actuators that are not gone are 0.
     k_s: DMatrix<f64>,
 }
 

@@ -15,7 +15,7 @@
 //! d[k+1] = A d[k] + B w[k],   [du; df_hat] = C d[k] + D w[k],   d = [dx; dx_hat; df_hat]
 //! ```
 //!
-//! for the differences d, du and df_hat from exact arithmetic. With the peak-to-peak gains G of this system, G kappa s
+//! for the differences d, du, `df_hat` from exact arithmetic. With the peak-to-peak gains G of this system, G kappa s
 //! bounds the differences of the outputs u and f_hat.
 //! The bound holds in the loop of the design, while faults are compensated and no command is at a limit.
 //! s has the signals of single precision. If all their differences are at most M s and the spectral radius of M is
@@ -240,8 +240,8 @@ mod tests {
         rounding.bound.map(|bound| bound[(1, 1)])
     }
 
-    /// s[k+1] = 0.9 s - s / (|s| + delta): the chords have slopes from 0.9 - 1 / delta to 0.9, so that it contracts
-    /// above delta = 1 / 1.9.
+    /// s[k+1] = 0.9 s - s / (|s| + delta): the chords have slopes from 0.9 - 1 / delta to 0.9, so the loop contracts
+    /// for delta above 1 / 1.9.
     #[test]
     fn a_sliding_mode_has_a_bound_where_all_slopes_contract() {
         assert!(bound(0.6).unwrap() < 1e-4);

@@ -9,14 +9,14 @@ macro_rules! vectors {
         }
 
         impl Vector {
-            /// The name in the code, without its structure.
+            /// The name of the vector in the code, without the structure that contains it.
             pub(super) fn name(self) -> &'static str {
                 match self {
                     $(Self::$vector => $name,)*
                 }
             }
 
-            /// The signals that its elements belong to.
+            /// The kind of signals to which the elements belong.
             pub(super) fn kind(self) -> Kind {
                 match self {
                     $(Self::$vector => Kind::$kind,)*

@@ -1,7 +1,7 @@
 //! A controller whose matrices and operating point depend on a scheduling variable.
 //!
 //! A sampled controller interpolates at each sample, a continuous one at each instant. The scheduling variable theta is
-//! limited to the grid theta_0, theta_1, ..., at whose points the matrices M_i are stated:
+//! limited to the grid, at whose points `theta_i` the design states the matrices `M_i`:
 //!
 //! ```text
 //! M(theta) = (1 - t) M_i + t M_{i+1},  t = (theta - theta_i) / (theta_{i+1} - theta_i)

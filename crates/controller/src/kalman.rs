@@ -188,7 +188,7 @@ mod tests {
         design.check()
     }
 
-    /// Two ramps have four states, which two faults of one rate would not fill.
+    /// Two ramps have four states: two faults and two rates, so the faults cannot share a rate.
     #[test]
     fn each_fault_has_a_signal_and_a_rate_of_its_own() {
         assert_eq!(check([0, 1], [2, 3]), Ok(()));

@@ -66,7 +66,7 @@ pub(crate) struct Attributes {
     pub(crate) texts: Vec<(Ident, LitStr)>,
     pub(crate) derivative_of: Option<Ident>,
     pub(crate) enumeration: Option<Items>,
-    /// `None` if it is not stated.
+    /// The names in `depends`; `None` if this attribute is not stated.
     pub(crate) depends: Option<Vec<Ident>>,
     pub(crate) initially: Option<Vec<Ident>>,
     pub(crate) derivatives: Vec<Ident>,

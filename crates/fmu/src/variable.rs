@@ -207,7 +207,7 @@ impl<M> Variable<M> {
     /// next call of [`Model::event`](crate::Model::event), and false afterwards.
     ///
     /// FMI 2.0 has no clocks: its description leaves them out, and an importer without event mode ticks none. For
-    /// these the model also states its ticks by [`Event::next_event_time`](crate::Event::next_event_time).
+    /// such importers the model also states its ticks by [`Event::next_event_time`](crate::Event::next_event_time).
     pub fn periodic_clock<F>(
         name: impl Into<String>,
         description: impl Into<String>,

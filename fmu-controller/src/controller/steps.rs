@@ -111,7 +111,7 @@ impl AsoController {
         self.measurement_check.get_or_insert_default()
     }
 
-    /// Whether a measurement is lost, so that the controller rests.
+    /// Whether the controller rests, because the last value replaces a measurement for too long.
     pub(super) fn is_resting(&self) -> bool {
         self.measurement_check.as_ref().is_some_and(|check| check.is_lost)
     }

@@ -44,8 +44,8 @@ pub(super) const STATES: [(&str, &str, &str, f64); 4] = [
 /// the pendulum, in motion on the velocity; the accelerations depend on the friction.
 pub(super) const DEPENDS: [&str; 5] = ["u", "f_a", "theta", "v_p", "omega"];
 
-/// The dependencies of the initial friction: at rest all except the position, the mass and the damping of the cart, in
-/// motion the friction law and the velocity.
+/// The dependencies of the initial friction: at rest, all except position, mass and damping of the cart; in motion, the
+/// friction law and the velocity.
 pub(super) const FRICTION_INITIALLY: [&str; 15] = [
     "u",
     "f_a",

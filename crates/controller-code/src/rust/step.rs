@@ -388,7 +388,7 @@ impl Controller {{
         );
     }
 
-    /// Adds the statement that counts the sample; nothing if no time depends on the number.
+    /// Adds the statement that counts the samples; nothing if the code needs no number of samples.
     fn count_sample(&self, lines: &mut Lines) {
         let controller = self.controller;
         if controller.counts_all() {

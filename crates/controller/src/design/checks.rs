@@ -444,7 +444,6 @@ impl Design {
                 let what = format!("range of {name} from {low} to");
                 return Some(Refusal::new(what, high, "two finite numbers, the smaller one first"));
             }
-            // The operating points of a schedule are in its points.
             let operating = signal.operating.unwrap_or(0.0);
             if self.schedule.is_none() && !(low..=high).contains(&operating) {
                 let what = format!("operating of {name}");

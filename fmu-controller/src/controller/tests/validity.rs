@@ -88,7 +88,7 @@ fn a_measurement_that_is_lost_ends_at_the_operating_point_and_starts_anew_from_t
         for k in 0..20_u32 {
             advance(&mut model, f64::from(k) * T, T, [measured(k), 0.0]);
         }
-        // Sample k is at the end of the step before; 4 samples, and steps, are within 0.5 s.
+        // Sample k is taken at the end of the previous step. The longest hold contains 4 samples, or 4 steps.
         for k in 20..60_u32 {
             advance(&mut model, f64::from(k) * T, T, [1e300, 0.0]);
             let flags = outputs(&model).1;
