@@ -20,7 +20,7 @@
 //! The bound holds in the loop of the design, while faults are compensated and no command is at a limit.
 //! s has the signals of single precision. If all their differences are at most M s and the spectral radius of M is
 //! below 1, they are bounded by the signals of double precision: rounding does not make the loop unstable.
-//! The residuals r of a detection are further outputs, and x_r is part of d; their size follows from those of y
+//! The residuals of a detection are further outputs, and x_r is part of d; their size follows from those of y
 //! and u. The bound takes the worst case of every rounding; errors of both signs cancel in practice. A scheduled loop
 //! is not such a system, and has no bound.
 //!
