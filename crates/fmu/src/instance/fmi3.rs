@@ -21,7 +21,7 @@ pub(crate) use derivatives::Jacobian;
 use intermediate::Intermediate;
 
 /// The largest number of scalars in one call whose places ([`Table`]) are on the stack.
-const FEW: usize = 8;
+const MOST_ON_STACK: usize = 8;
 
 /// The part of an instance that only FMI 3.0 has.
 pub(crate) struct Session {
@@ -222,8 +222,8 @@ impl<M: Model> Instance<M> {
         count: usize,
         body: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let mut few = [0; FEW];
-        if let Some(places) = few.get_mut(..count)
+        let mut on_stack = [0; MOST_ON_STACK];
+        if let Some(places) = on_stack.get_mut(..count)
             && self.session()?.table.locate_scalars(kind, references, places)
         {
             return body(self, places);

@@ -12,7 +12,7 @@ use crate::pendulum::variables::{CART, DEPENDS, FRICTION_INITIALLY};
 type Found = [BTreeSet<String>; 7];
 
 /// Records which unknowns the change of `known` has changed.
-fn note(actual: &mut Found, known: &str, before: &[f64; 7], after: &[f64; 7]) {
+fn record(actual: &mut Found, known: &str, before: &[f64; 7], after: &[f64; 7]) {
     for (k, names) in actual.iter_mut().enumerate() {
         if before[k].to_bits() != after[k].to_bits() {
             names.insert(known.to_owned());
@@ -42,7 +42,7 @@ fn between_events_each_unknown_depends_on_what_is_stated_and_on_nothing_else() {
         for known in AT_A_POINT {
             for shift in SHIFTS {
                 let after = moved_at_a_point(&model, known, shift);
-                note(&mut actual, known, &unknowns(&model), &after);
+                record(&mut actual, known, &unknowns(&model), &after);
             }
         }
     }
@@ -63,14 +63,14 @@ fn at_initialization_each_unknown_depends_on_what_is_stated_and_on_nothing_else(
                 *field(&mut moved, &known) += shift * size;
                 if moved.check().is_ok() {
                     let after = moved_at_initialization(&model, &known, shift * size);
-                    note(&mut actual, &known, &unknowns(&model), &after);
+                    record(&mut actual, &known, &unknowns(&model), &after);
                 }
             }
         }
         let mut other = model.clone();
         other.parameters.linearised = !model.parameters.linearised;
         other.initialize(&Experiment::default()).unwrap();
-        note(&mut actual, "linearised", &unknowns(&model), &unknowns(&other));
+        record(&mut actual, "linearised", &unknowns(&model), &unknowns(&other));
     }
     let accelerations = &[&FRICTION_INITIALLY[..], &CART].concat();
     assert_stated(

@@ -58,7 +58,7 @@ fn a_function_may_be_called_exactly_in_the_states_of_sections_3_2_3_and_4_2_4() 
 
 /// Calls each function in each state: only an allowed call reaches the model. Any other call is an error after
 /// which the instance is in the state error; after a fatal failure the state stays fatal.
-fn walk<M: Model>(interface: InterfaceType, instantiate: impl Fn() -> Instance<M>) {
+fn call_in_every_state<M: Model>(interface: InterfaceType, instantiate: impl Fn() -> Instance<M>) {
     for state in State::EVERY {
         for &function in Function::EVERY {
             let mut instance = instantiate();
@@ -82,6 +82,6 @@ fn walk<M: Model>(interface: InterfaceType, instantiate: impl Fn() -> Instance<M
 
 #[test]
 fn a_call_out_of_order_is_an_error_and_never_reaches_the_model() {
-    walk::<Decay>(InterfaceType::CoSimulation, fresh);
-    walk(InterfaceType::ModelExchange, || pendulum(InterfaceType::ModelExchange));
+    call_in_every_state::<Decay>(InterfaceType::CoSimulation, fresh);
+    call_in_every_state(InterfaceType::ModelExchange, || pendulum(InterfaceType::ModelExchange));
 }
