@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// The interpreter that is asked for the package, unless the variable [`VARIABLE`] names another.
+/// The Python interpreter, unless the variable [`VARIABLE`] names another.
 const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
 /// The environment variable that names the interpreter.
 const VARIABLE: &str = "ASO_FTC_PYTHON";

@@ -100,8 +100,8 @@ pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
     Ok(errors == 0)
 }
 
-/// Returns the result of the trial, and all findings, sorted by severity, errors first; of each severity, findings that
-/// stop a tool come first.
+/// Returns the result of the trial and all findings, errors first. Within a severity, findings that stop a tool come
+/// first.
 fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let description = &unpacked.description;
     let mut findings = archive::check(&options.fmu, unpacked.entries(), description)?;
@@ -134,7 +134,7 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
     Ok((result, findings))
 }
 
-/// Returns the result for an FMU that cannot or shall not be run; `None` if it is to be run.
+/// Returns the reason not to run the FMU; `None` if a trial is possible and requested.
 fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> {
     let not_tried = |reason: String| Some(TrialResult::NotTried { reason });
     if options.no_run {
@@ -151,7 +151,7 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     if !is_simulation && cfg!(not(target_os = "linux")) {
         return not_tried("it is for model exchange only, which is tried on Linux only".to_owned());
     }
-    // An FMU of PythonFMU states that it needs a tool, but its libraries are enough.
+    // PythonFMU sets needsExecutionTool in its FMUs, although they run without a tool.
     let is_python = |tool: &str| tool.starts_with("PythonFMU");
     let is_complete = description.generation_tool.as_deref().is_some_and(is_python);
     if needs_tool && !is_complete && options.preload.is_empty() {
@@ -162,8 +162,8 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     Some(TrialResult::No { reason: refused.to_string() })
 }
 
-/// Runs the FMU; on Linux in separate processes, which may crash or hang. Returns an error if the time limit is not a
-/// number above 0.
+/// Runs the FMU; on Linux in separate processes, so that a crash or a hang is a finding. Returns an error if the time
+/// limit is not a number above 0.
 fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let seconds = options.time_limit;
     let limit = Duration::try_from_secs_f64(seconds).ok().filter(|limit| !limit.is_zero());
@@ -191,7 +191,7 @@ fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, V
     Ok(behaviour::check(&as_stepped(&unpacked.description), options.thorough, &mut make))
 }
 
-/// Returns the description of an FMU with the steps of its scheduled execution, if it has no co-simulation.
+/// Returns the description; without co-simulation, the steps of scheduled execution take its place.
 fn as_stepped(description: &ModelDescription) -> ModelDescription {
     ModelDescription { co_simulation: description.stepped(), ..description.clone() }
 }
@@ -240,7 +240,7 @@ fn isolated(
     };
     let (result, mut findings) = behaviour::check(description, thorough, &mut make);
     if exchange {
-        // Other findings are about rules of co-simulation.
+        // The other findings are about rules of co-simulation, which the FMU does not have.
         findings.retain(|finding| {
             finding.severity == Severity::Error && matches!(result, TrialResult::No { .. })
         });

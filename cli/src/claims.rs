@@ -11,7 +11,7 @@ pub(crate) const WATCHED: [&str; 5] =
 
 /// Time in s after the activation at which the measurement of the residual motion starts.
 const SETTLING: f64 = 20.0;
-/// Fraction of the time before the activation, at its end, in which the limit cycle is measured.
+/// The limit cycle is measured in this last fraction of the time before the activation.
 const CYCLE: f64 = 0.75;
 /// Shortest slide in m that is counted: when the cart creeps to its rest, rounding makes it stick and slip.
 const SLIDE: f64 = 1e-3;
@@ -61,8 +61,8 @@ struct Window {
     /// last rest.
     slides: u32,
     rest: Option<f64>,
-    /// The last regime, 0 at rest, and the time of the last change between rest and sliding; both are also of times
-    /// outside of the window, and NaN before.
+    /// The last regime, 0 at rest, and the time of the last change between rest and sliding. Both include times outside
+    /// of the window, and are NaN at first.
     regime: f64,
     changed_at: f64,
 }
@@ -132,8 +132,8 @@ pub(crate) struct Claim {
     pub(crate) paper: &'static str,
     pub(crate) measured: f64,
     pub(crate) unit: &'static str,
-    /// `None` if the part of the run that the claim is about is too short to judge it, or absent; false if the run
-    /// failed or the pendulum fell before.
+    /// `None` if the part of the run that the claim is about is missing or too short to judge; false if the run failed
+    /// or the pendulum fell before that part.
     pub(crate) holds: Option<bool>,
 }
 
@@ -158,7 +158,7 @@ impl Measurement {
         }
     }
 
-    /// Returns the time in s of the first sample at which the pendulum had passed the horizontal; `None` if it has not.
+    /// Returns the time in s of the first sample with the pendulum below the horizontal; `None` if there is none.
     pub(crate) fn fell(&self) -> Option<f64> {
         self.fell
     }

@@ -243,8 +243,8 @@ struct CodeFile {
 }
 
 impl CodeFiles {
-    /// Whether the file at `path` is a runtime file, which is the same for every design and does not contain the
-    /// `identity` of one. Such a file starts with the first line of the runtime file that is written.
+    /// Whether the existing file at `path` is a runtime file, which is the same for every design and therefore does not
+    /// contain an `identity`. It is recognised by the first line of the file to be written at `path`.
     fn is_runtime(&self, path: &Path, identity: &str) -> bool {
         let text = self.files.iter().find(|file| file.path == path).map(|file| &file.text);
         let start =

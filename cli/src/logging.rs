@@ -19,7 +19,7 @@ use crate::output;
 
 /// `target` of the events for messages of FMUs.
 pub(crate) const FMU: &str = "fmu";
-/// `target` of the events of a results file; the information that it is replaced is logged without `verbose`, too.
+/// `target` of the events about a results file, of which information is logged without `verbose`, too.
 pub(crate) const RESULTS_FILE: &str = "results::output";
 
 /// Starts logging: errors, warnings, and that a results file is replaced; with `verbose` 1, all information; from 2 on,
@@ -42,7 +42,7 @@ pub(crate) fn start(verbose: u8, json: bool) {
     };
 }
 
-/// Formats a message and discards it, so that this thread has the memory of its own that later messages use.
+/// Formats a message and discards it, so that later messages of this thread need no new memory.
 pub(crate) fn use_memory_of_thread() {
     let layer = tracing_subscriber::fmt::layer().with_writer(io::sink).event_format(Sentence);
     let nowhere = tracing_subscriber::registry().with(layer);
@@ -120,14 +120,14 @@ fn bars() -> &'static MultiProgress {
     BARS.get_or_init(MultiProgress::new)
 }
 
-/// Returns a progress bar of this length, which is shown.
+/// Adds a progress bar of this length to the display.
 pub(crate) fn bar(template: &str, length: u64) -> ProgressBar {
     let style = ProgressStyle::with_template(template);
     let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
     bars().add(ProgressBar::new(length).with_style(style.with_key("percent", percent)))
 }
 
-/// Returns a position on a bar: the whole part, 0 for a number below it.
+/// Rounds a value down to a position on a bar; 0 for a negative value.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a display")]
 pub(crate) fn position(value: f64) -> u64 {
     value as u64
@@ -136,7 +136,7 @@ pub(crate) fn position(value: f64) -> u64 {
 /// Writes the percentage that is done; it is rounded down, so that 100 % is the end.
 fn percent(state: &ProgressState, text: &mut dyn fmt::Write) {
     let percent = 100 * state.pos() / state.len().unwrap_or(1).max(1);
-    // A text takes every write.
+    // Writing to a text does not fail.
     let _ = write!(text, "{percent}");
 }
 
@@ -154,7 +154,7 @@ impl Write for StandardError {
     }
 }
 
-/// Formats a message as text: `warning: ...`, of an FMU `warning: plant, t = 0.5 s, logStatusWarning: ...`.
+/// Formats a message as text: `warning: ...`, or for an FMU `warning: plant, t = 0.5 s, logStatusWarning: ...`.
 struct Sentence;
 
 impl<S, N> FormatEvent<S, N> for Sentence

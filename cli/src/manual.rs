@@ -66,8 +66,8 @@ fn page(command: &clap::Command) -> std::io::Result<(String, String)> {
     Ok((man.get_filename(), page.trim_end().to_owned() + &section(&examples)))
 }
 
-/// Converts the end of a help text, `Title:` and lines, to a section of a manual page that keeps the lines; another
-/// text to an empty line.
+/// Converts the end of a help text, `Title:` and lines, to a section of a manual page with the same line breaks.
+/// Returns an empty line for a text without this form.
 fn section(text: &str) -> String {
     let Some((title, lines)) = text.split_once(":\n") else { return "\n".to_owned() };
     let lines = lines.replace('\\', r"\e").replace('-', r"\-");

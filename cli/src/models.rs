@@ -31,7 +31,7 @@ pub(crate) fn default_fmu(name: &str) -> anyhow::Result<PathBuf> {
     paths.find(|path| path.is_file()).with_context(|| missing(&packed))
 }
 
-/// Returns the sentence for an FMU that is not packed. No option names another Kalman filter.
+/// Returns the error message for an FMU that is not packed. Only for a Kalman filter, no option names another file.
 fn missing(packed: &Path) -> String {
     let advice = if packed.ends_with(FILTER) {
         "write it by `aso-ftc pack fmu-kalman` in a clone"

@@ -76,8 +76,8 @@ fn identifier(name: &str) -> anyhow::Result<String> {
     Ok(identifier)
 }
 
-/// Returns the value of `fmu =` in the manifest: a git URL or a folder. Returns an error if it is not that of the crate
-/// fmu.
+/// Returns the value of `fmu =` in the manifest: a git URL or a folder. Returns an error for a folder without the crate
+/// fmu, and if `source` is `None` outside of a clone.
 fn dependency(source: Option<&str>) -> anyhow::Result<String> {
     let has_form_of_url = |source: &str| source.contains("://") || source.contains('@');
     let is_url = |source: &&str| has_form_of_url(source) && !Path::new(source).is_dir();
@@ -119,7 +119,7 @@ fn is_fmu(folder: &Path) -> bool {
 
 /// Writes the files into a temporary folder next to `target` and then renames it. Creates the parent folders.
 fn write(target: &Path, files: &[(&str, String)]) -> std::io::Result<()> {
-    // Drops a slash at the end, after which the temporary folder would be inside of the target.
+    // `components` drops a slash at the end, with which the temporary folder would be inside of the target.
     let target: PathBuf = std::path::absolute(target)?.components().collect();
     let mut partial = target.clone().into_os_string();
     partial.push(format!(".{}.partial", std::process::id()));

@@ -55,8 +55,8 @@ pub(crate) fn parse<P: clap::Parser>() -> Result<P, u8> {
     })
 }
 
-/// Returns the exit status of the command: `status`, or 1 in place of 0 if a part of what it printed is lost, which
-/// this function reports.
+/// Returns the exit status of the command: `status`, or 1 in place of 0 if printed text was lost. Also reports such a
+/// loss.
 pub(crate) fn finish(status: u8) -> u8 {
     note(io::stdout().flush());
     let Some(error) = FAILED.lock().unwrap_or_else(PoisonError::into_inner).take() else {

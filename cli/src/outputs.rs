@@ -101,8 +101,8 @@ impl Replacement {
     }
 }
 
-/// Writes `bytes` to `path`, completely or not at all; creates its folder if necessary. A pipe or a device gets the bytes
-/// itself.
+/// Writes `bytes` to `path`, completely or not at all; creates its folder if necessary. A pipe or a device gets the
+/// bytes itself.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     files::whole::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
@@ -111,7 +111,7 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
 /// `None` if there is no file.
 fn second_name(path: &Path) -> io::Result<Option<PathBuf>> {
     let mut former = beside(path, "old");
-    // A killed process with the same number may have left such a name, which may be a link to this file.
+    // A killed process with the same number may have left such a name, even as a link to this file.
     for number in 2.. {
         if former.symlink_metadata().is_err() {
             break;
@@ -157,7 +157,7 @@ pub(crate) fn check_identity(path: &Path, identity: &str) -> anyhow::Result<()> 
     let mut head = Vec::new();
     let file = match fs::File::open(path) {
         Ok(file) => file,
-        // Without a folder there is no file either; writing names the reason.
+        // The folder does not exist: the error of the later write says so.
         Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
             return Ok(());
         }

@@ -305,7 +305,7 @@ fn add_terminals(
     Ok(())
 }
 
-/// Adds the author's files other than the drawing, and an entry page if they have none.
+/// Adds the author's documentation except the drawing, and an entry page if there is none.
 fn add_documentation(
     package: &mut Package,
     folder: &Path,

@@ -45,7 +45,7 @@ pub(crate) fn plot_with_units(
     outputs::write(out, &if is_png { rasterise(&svg)? } else { svg.into_bytes() })
 }
 
-/// Whether the extension of a picture is `.png`; another one than this and `.svg` is an error.
+/// Returns true for the extension `.png`, false for `.svg`, and an error for any other.
 pub(crate) fn is_png(picture: &Path) -> anyhow::Result<bool> {
     let ending = picture.extension().unwrap_or_default().to_ascii_lowercase();
     let shown = picture.display();

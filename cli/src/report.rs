@@ -80,8 +80,7 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints the largest difference relative to the range, that there is none, or that the runs have no time in common;
-/// and what was not compared.
+/// Prints the largest difference relative to the range, or why there is none, and lists what was not compared.
 fn print_comparison(comparison: &Comparison, results: &Path, other: &Path) {
     let (here, there) = (results.display().to_string(), other.display().to_string());
     if comparison.rows == 0 {

@@ -46,7 +46,7 @@ pub(crate) fn run(options: &Options) -> u8 {
         Ok(Some(active)) => {
             let log = active.log_calls.clone();
             let status = active.go();
-            // The last calls free the instances.
+            // Checked here because the last calls to log, which free the instances, are in `go`.
             match log.map(|(log, path)| (log.check(), path)) {
                 Some((Err(error), path)) => {
                     tracing::error!("{}: calls are missing: {error}", path.display());
@@ -123,13 +123,13 @@ fn prepare(options: &Options) -> anyhow::Result<Option<ActiveRun>> {
     Ok(Some(ActiveRun { run, folder, units, report, planned, bus_trace, pace, live, log_calls }))
 }
 
-/// Checks that no output is an input and that results to a stream are not needed again; reserves standard output for
-/// the results if they go there.
+/// Checks that no output file is also an input, and that no report or plot reads results back from a stream. Reserves
+/// standard output for the results if they go there.
 fn check_outputs(options: &Options, loaded: &LoadedConfig) -> anyhow::Result<()> {
     let config = &loaded.config;
     let results = config.results.file.as_deref();
     let page = results.filter(|_| options.results.report).map(|file| file.with_extension("html"));
-    // A resumed run has another file, and no configuration that it could overwrite.
+    // A resumed run writes another file, but reads no configuration that the file could overwrite.
     let beside = results.filter(|file| !is_stream(file)).unwrap_or(Path::new(live::FILE));
     let repetition = options.watching.live.map(|_| beside.with_file_name(live::FILE));
     let outputs = [
@@ -300,7 +300,7 @@ impl ActiveRun {
         println!("{outcome}");
         self.warn_of_fallbacks(tally);
         let written = self.write(&ended);
-        // For the live view.
+        // The message at the end of the live view.
         let mut message = outcome.clone();
         let status = match &ended {
             RunEnd::AtStop => 0,

@@ -14,7 +14,7 @@ use serde::Serialize;
 use crate::claims::Claim;
 use crate::outputs;
 
-/// The design parameter alpha of (12); it cancels in delta.
+/// The design parameter alpha of equation (12) of the paper; it cancels in delta.
 const ALPHA: f64 = 1.0;
 
 /// The content of `summary.json`.
@@ -73,7 +73,7 @@ struct Numbers {
     p: Rows,
     p_smallest_eigenvalue: f64,
     p_largest_eigenvalue: f64,
-    /// Residual of (12), each entry relative to the terms of its sum.
+    /// Residual of equation (12), each entry relative to the terms of its sum.
     residual: f64,
     delta: f64,
     note: &'static str,

@@ -31,8 +31,8 @@ pub(crate) fn supervise(options: &run::Options) -> Option<ExitCode> {
     }
 }
 
-/// Returns the exit status of the command. Reports what the process of the run did not report: an unexpected end and,
-/// unless the process chose a status other than 0, the results file, which this function completes.
+/// Returns the exit status of the command. Reports an unexpected end of the process of the run. Unless this process
+/// chose a status other than 0, also completes its results file and reports that.
 fn judge(ended: &Ended) -> u8 {
     let status = judge_end(ended);
     if !has_chosen_end(ended) {
@@ -87,7 +87,7 @@ fn judge_end(ended: &Ended) -> u8 {
     }
 }
 
-/// Lists the calls that had not returned; without one, names the code outside of the calls.
+/// Lists the calls that had not returned; if there are none, names the code outside of calls.
 fn calls(ended: &Ended) -> String {
     if ended.calls.is_empty() {
         return "outside of the calls of FMUs the program or a thread of an FMU".to_owned();

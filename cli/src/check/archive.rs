@@ -166,7 +166,7 @@ fn top_level(names: &[String], version: Version, findings: &mut Findings) {
     }
 }
 
-/// Whether a file, no folder, has a path that starts with `start`.
+/// Whether a file (not a folder) has a path that starts with `start`.
 fn has_file(names: &[String], start: &str) -> bool {
     names.iter().any(|name| name.starts_with(start) && !name.ends_with('/'))
 }

@@ -18,15 +18,15 @@ use super::values::{Value, distance, get, outputs, start, start_variables, unkno
 const STEPS: u32 = 10;
 /// Largest number of outputs, of inputs and of start values that are read.
 const VARIABLES: usize = 1000;
-/// Largest relative difference of the outputs after a state is restored that is a warning and no error: a solver
-/// restarts.
+/// Up to this relative difference, other outputs after a state is restored are a warning, not an error: a solver that
+/// restarts causes them.
 const ROUNDING: f64 = 1e-6;
 
-/// Number of messages of all instances of a trial above which they are a warning.
+/// Number of messages of all instances of a trial above which their number is a finding.
 const FLOOD: u64 = 10_000;
 
-/// A function that creates an instance with the given name. The instance replaces the former one that
-/// is given, if any, in the same process where that is possible.
+/// A function that creates an instance with the given name. If a former instance is given, the function frees it and
+/// uses the same process where possible.
 pub(super) type MakeInstance<'a, S> = dyn FnMut(&str, Option<S>) -> anyhow::Result<S> + 'a;
 
 /// The outputs at each communication point of a trial, including the start.
@@ -62,7 +62,7 @@ struct Trial<'a, S> {
     make: &'a mut MakeInstance<'a, S>,
     /// Result of the first instance.
     result: TrialResult,
-    /// What the FMU has changed in its process, as texts of findings.
+    /// The settings of its process that the FMU has changed, as texts of findings.
     changes: BTreeSet<String>,
     findings: Findings,
 }
@@ -106,7 +106,7 @@ impl<S: Slave> Trial<'_, S> {
         self.check_states();
     }
 
-    /// Records that the first instance completed its steps, or fewer for the reason in the last note.
+    /// Records the steps of the first instance; if they are fewer than planned, the last note is the reason.
     fn record_success(&mut self, trajectory: &Trajectory) {
         let steps = u32::try_from(trajectory.len().saturating_sub(1)).unwrap_or(u32::MAX);
         let note = self.findings.all.iter().rfind(|finding| finding.severity == Note);
@@ -119,8 +119,8 @@ impl<S: Slave> Trial<'_, S> {
         };
     }
 
-    /// Records that the first instance failed; the last error is the reason. An FMU that ended its process stops
-    /// importers that call it in their own.
+    /// Records that the first instance failed; the last error is the reason. If the FMU ended its process, this error
+    /// stops importers that call the FMU in their own process.
     fn record_failure(&mut self) {
         let mut errors = self.findings.all.iter_mut().filter(|finding| finding.severity == Error);
         let Some(error) = errors.next_back() else { return };
@@ -133,7 +133,7 @@ impl<S: Slave> Trial<'_, S> {
     /// Adds a finding for two trajectories that differ, with the first step at which they do.
     fn report_difference(&mut self, first: &Trajectory, second: &Trajectory) {
         let step = first.iter().zip(second).position(|(one, other)| one != other);
-        // Without a difference, one of the two ends earlier.
+        // If all common steps are equal, one of the trajectories is shorter.
         let step = step.unwrap_or(first.len().min(second.len()));
         let what = format!("a second instance has other outputs, from step {step}");
         let why = "A run cannot be repeated: statics, uninitialised memory or the clock are used.";
@@ -203,8 +203,8 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Whether the FMU sends messages about its errors with logging off. One of FMI 3.0 may send only messages of
-    /// categories that are switched on, as the importer does for those of statuses (FMI 3.0.2, section 2.3.1).
+    /// Whether the FMU should explain its errors by messages although logging is off. In FMI 3.0 it may do so only if
+    /// it has a category for errors, as the importer switches on the categories of statuses (FMI 3.0.2, section 2.3.1).
     fn explains_errors(&self) -> bool {
         let mut categories = self.description.log_categories.iter();
         self.description.version() != Version::V3
@@ -230,9 +230,9 @@ impl<S: Slave> Trial<'_, S> {
         self.start_time() + f64::from(k) * self.step_size()
     }
 
-    /// Runs an instance with the name `name` from the start to `fmi2Terminate`; returns its outputs and the
-    /// instance. Returns `None` after a failure, other than one of `fmi2Terminate` or of the reading after it
-    /// that leaves the process usable. The start values and the outputs of the `first` instance are checked.
+    /// Runs the instance `name` from the start to `fmi2Terminate`; returns its outputs and the instance, `None` after a
+    /// failure. A failure of `fmi2Terminate`, or of the reading after it, counts only if the process is then unusable.
+    /// Also checks the start values and the outputs of the instance `first`.
     fn trajectory(&mut self, name: &str, former: Option<S>) -> Option<(Trajectory, S)> {
         let mut slave = self.initialize(name, None, former)?;
         if name == "first" {
@@ -272,7 +272,7 @@ impl<S: Slave> Trial<'_, S> {
         count.map_or(STEPS, |count| (count as u32).max(1))
     }
 
-    /// Adds a finding for each setting of its whole process that the FMU has changed, once.
+    /// Adds one finding for each process-wide setting that the FMU has changed.
     fn check_process(&mut self, slave: &mut S, when: &str) {
         for change in slave.process_changes().unwrap_or_default() {
             if self.changes.insert(change.clone()) {
@@ -363,8 +363,8 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Checks that an unknown value reference is an error. In FMI 3.0 our importer itself refuses
-    /// it, as it gives references to the elements of arrays.
+    /// Checks that the FMU refuses an unknown value reference. Skips FMI 3.0, where our importer refuses it before the
+    /// call.
     fn check_unknown_reference(&mut self) {
         if self.description.version() == Version::V3 {
             return;

@@ -110,11 +110,11 @@ pub(crate) fn check(
     findings.all
 }
 
-/// Returns the functions that a library must export: of FMI 2.0 those of its interface types, of FMI 3.0 all, of FMI
-/// 1.0 those of co-simulation with the model identifier before them, none if it is for model exchange only.
+/// Returns the functions that a library must export. FMI 1.0: those of co-simulation, prefixed with the model
+/// identifier; FMI 2.0: those of `interfaces`; FMI 3.0: all.
 fn required(version: Version, interfaces: &[InterfaceType], identifier: &str) -> Vec<String> {
     match version {
-        // The functions of model exchange are not checked.
+        // The functions of model exchange of FMI 1.0 are not checked.
         Version::V1 if !interfaces.contains(&InterfaceType::CoSimulation) => Vec::new(),
         Version::V1 => abi1::FUNCTIONS.map(|name| format!("{identifier}_{name}")).to_vec(),
         Version::V2 => required_functions(interfaces).map(str::to_owned).collect(),
@@ -122,7 +122,7 @@ fn required(version: Version, interfaces: &[InterfaceType], identifier: &str) ->
     }
 }
 
-/// Returns the platform if an error stops all of its importers; nothing for lacking functions and lesser findings.
+/// Returns the platform, whose importers an error stops; nothing for missing functions, warnings and notes.
 fn stops_platform(finding: &Finding, platform: &Platform) -> Vec<Tool> {
     if finding.severity == Error && !finding.what.starts_with("lacks ") {
         return vec![Tool::Platform(platform.folder)];
@@ -156,8 +156,8 @@ const BY_FLAG: [&str; 7] = [
     "fmi2GetDirectionalDerivative",
 ];
 
-/// Returns the tools that a finding about a library of FMI 2.0 stops; none unless it is an error. Of lacking functions,
-/// only those of co-simulation count if the FMU supports it.
+/// Returns the tools that a finding about a library of FMI 2.0 stops; none unless it is an error. If the FMU supports
+/// co-simulation, missing functions of model exchange stop no tool.
 fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -> Vec<Tool> {
     if finding.severity != Error {
         return Vec::new();
@@ -177,8 +177,8 @@ fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -
     }
 }
 
-/// Returns the names of the libraries, each with the interface types that it serves; none for a library that serves
-/// Scheduled Execution only, since one of FMI 3.0 exports all functions whatever it serves.
+/// Returns each library: the interface types that it serves, and its name. The types omit Scheduled Execution, which
+/// only FMI 3.0 has: there a library exports all functions for any type.
 fn interfaces(description: &ModelDescription) -> Vec<(Vec<InterfaceType>, String)> {
     use InterfaceType::{CoSimulation, ModelExchange};
     let exchange = description.model_exchange.as_ref().map(|flags| flags.model_identifier.clone());
@@ -233,7 +233,7 @@ fn library(
     versions(&file, path, findings);
 }
 
-/// Returns the part of a universal file of macOS for `machine`, `None` if it has none; another file as a whole.
+/// Returns the part for `machine` of a universal macOS file, `None` if it has none; any other file as a whole.
 fn slice_of(bytes: &[u8], machine: Architecture) -> Option<&[u8]> {
     use object::read::macho::{FatArch as _, MachOFatFile32, MachOFatFile64};
     if let Ok(fat) = MachOFatFile32::parse(bytes) {
@@ -299,7 +299,7 @@ fn functions(file: &object::File<'_>, path: &str, required: &[String], findings:
     findings.add(Error, path, what, why, "2.1.1");
 }
 
-/// Starts of the names, in lower case, of libraries that belong to the operating system, with white space between them.
+/// Prefixes of the names, in lower case, of libraries of the operating system, separated by white space.
 const SYSTEM: &str = "libc.so libm.so libmvec.so libpthread.so libdl.so librt.so libutil.so \
     libresolv.so libgcc_s.so ld-linux linux-vdso libstdc++.so \
     /usr/lib/ /system/ kernel32 kernelbase ntdll user32 advapi32 \

@@ -35,7 +35,7 @@ const RULES: [Rule; 20] = {
         rule("which is not defined", refused, &[FmpyValidation]),
         rule("needs a start value", zero, &[FmpyValidation]),
         rule("has a start value, which", refused, &[FmpyValidation]),
-        // FMPy treats it as the default.
+        // FMPy treats `exact` as the default.
         rule("initial exact is not allowed for discrete input", "", &[]),
         rule("initial exact is not allowed for continuous input", "", &[]),
         rule("is not allowed for", refused, &[FmpyValidation]),

@@ -75,7 +75,7 @@ pub(crate) struct Finding {
     pub(crate) what: String,
     /// The effect on importers.
     pub(crate) why: Option<String>,
-    /// Section of the standard, of the version of the FMU; of FMI 2.0.5 before [`super::sections::renumber`].
+    /// Section of the standard: of FMI 2.0.5 until [`super::sections::renumber`] converts it to the version of the FMU.
     pub(crate) section: Option<&'static str>,
     /// The tools that the finding stops.
     pub(crate) stops: Vec<Tool>,
@@ -92,7 +92,7 @@ impl fmt::Display for Severity {
 }
 
 impl Finding {
-    /// Writes the finding as text, with `more` after [`Finding::what`].
+    /// Writes the finding as text, with the text `more` after [`Finding::what`].
     pub(crate) fn write(&self, formatter: &mut fmt::Formatter<'_>, more: &str) -> fmt::Result {
         let Self { severity, place, what, section, why, .. } = self;
         write!(formatter, "{severity}: {place}: {what}{more}")?;

@@ -9,7 +9,7 @@ use super::finding::{Finding, Part, Severity, Tool};
 pub(super) struct FindingGroup<'a> {
     first: &'a Finding,
     more: usize,
-    /// The other objects, as a noun in the plural.
+    /// A plural noun for the objects of the further findings, such as `files`.
     others: &'static str,
 }
 
@@ -26,9 +26,8 @@ impl fmt::Display for FindingGroup<'_> {
 /// What all findings of a group have in common: severity, part, patterns of place, what and why, section, stops.
 type Key<'a> = (Severity, Part, String, String, Option<String>, Option<&'static str>, &'a [Tool]);
 
-/// Groups findings by kind, in the order of their first occurrence. Two findings have the same kind
-/// if they differ only in names of variables, quoted texts, paths and numbers; numbers in findings about libraries
-/// count.
+/// Groups findings by kind, in the order of their first occurrence. Two findings have the same kind if they differ only
+/// in names of variables, quoted texts, paths and, except in findings about libraries, numbers.
 pub(super) fn fold<'a>(
     findings: &'a [Finding],
     variables: &HashSet<&str>,
@@ -50,7 +49,7 @@ pub(super) fn fold<'a>(
         }
         known.insert(key, groups.len());
         let others = match part {
-            // Words of their findings, such as "a", may be names of variables, too.
+            // Words such as "a" in these findings may also be names of variables.
             Part::Archive | Part::Binaries => "files",
             Part::Description | Part::Behaviour if named => "variables",
             Part::Description | Part::Behaviour => "places",
@@ -64,7 +63,7 @@ pub(super) fn fold<'a>(
 /// `numbers`, numbers. Sets `named` to true if it removes the name of a variable.
 fn pattern(text: &str, variables: &HashSet<&str>, numbers: bool, named: &mut bool) -> String {
     let mut pattern = String::with_capacity(text.len());
-    // Every second part is within quotation marks.
+    // The parts with an odd index are within quotation marks.
     for (index, part) in text.split('"').enumerate() {
         if index % 2 == 1 {
             pattern.push('"');

@@ -17,7 +17,7 @@ pub(super) struct MessageSummary {
     pub(super) messages: u64,
 }
 
-/// A layer that records the messages.
+/// A layer of `tracing` that records the messages.
 #[derive(Clone, Default)]
 pub(super) struct MessageRecorder {
     messages: Arc<Mutex<MessageSummary>>,

@@ -18,7 +18,7 @@ const XML: &str = r#"<fmiModelDescription fmiVersion="2.0" modelName="Sum" guid=
 </ModelVariables><ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>
 </fmiModelDescription>"#;
 
-/// The same in FMI 3.0.
+/// The model of [`XML`] in FMI 3.0.
 const XML_3: &str = r#"<fmiModelDescription fmiVersion="3.0" modelName="Sum" instantiationToken="t">
 <CoSimulation modelIdentifier="Sum"/>
 <LogCategories/>
@@ -44,7 +44,7 @@ enum Fault {
     LostState,
     RoundedState,
     NoState,
-    /// No fault: it discards saved states when a step says that none is restored (`noSetFMUStatePriorToCurrentPoint`).
+    /// No fault: the slave discards saved states at a step with `noSetFMUStatePriorToCurrentPoint`.
     DiscardsStates,
     ReadAfterTheEnd,
     Step,

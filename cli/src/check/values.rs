@@ -40,8 +40,8 @@ impl Value {
         }
     }
 
-    /// Returns the difference of two real numbers; 0 for equal values, infinite for others that are not finite real
-    /// numbers.
+    /// Returns the absolute difference of two real numbers. Equal values of any type have the difference 0; other
+    /// values that are not finite real numbers have an infinite one.
     fn difference(&self, other: &Value) -> f64 {
         match (&self.0, &other.0) {
             _ if self == other => 0.0,
@@ -66,8 +66,8 @@ impl Value {
     }
 }
 
-/// Returns the largest difference between two trajectories of outputs, relative to the largest value of each output in
-/// them; infinite if the lengths differ, or values that are not finite real numbers.
+/// Returns the largest difference between two trajectories of outputs, relative to the largest magnitude of each
+/// output. It is infinite if the lengths differ, or if values differ that are not finite real numbers.
 pub(super) fn distance(one: &[Vec<Value>], other: &[Vec<Value>]) -> f64 {
     if one.len() != other.len() {
         return f64::INFINITY;
@@ -96,8 +96,8 @@ pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
     start.map(Value)
 }
 
-/// Returns the variables that keep their start value during the initialization: parameters, inputs,
-/// constants. Clocked ones cannot be read after it.
+/// Returns the variables that keep their start value during the initialization: parameters, inputs, constants. Omits
+/// clocked variables, which cannot be read after the initialization.
 pub(super) fn start_variables(
     description: &ModelDescription,
 ) -> impl Iterator<Item = &ScalarVariable> {
@@ -123,7 +123,7 @@ pub(super) fn unknown_reference(description: &ModelDescription) -> u32 {
 mod tests {
     use super::*;
 
-    /// The second output is zero but for rounding at its end, as an error that decays.
+    /// The second output decays to a rounding error, as a control error does.
     #[test]
     fn trajectories_are_compared_by_the_size_of_each_output() {
         let rows = |all: &[[f64; 2]]| -> Vec<Vec<Value>> {

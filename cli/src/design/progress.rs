@@ -43,7 +43,7 @@ impl Reporter {
         Self::Bar(bar)
     }
 
-    /// Shows the step that starts; the lines name the step that is the latest one when they are printed.
+    /// Shows the step that starts; without a bar, the next line names the latest step.
     pub(super) fn show(&self, progress: Progress) {
         match self {
             Self::Bar(bar) => {

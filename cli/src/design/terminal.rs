@@ -14,8 +14,8 @@ use design::{Comparison, Report};
 /// Largest number of rows or columns of a gain, of eigenvalues and of commands that are printed.
 const LARGEST_SHOWN: usize = 16;
 
-/// Entries of a gain that are smaller than this part of its largest one are printed as 0, as are steady-state errors
-/// below it.
+/// Entries of a gain below this fraction of its largest entry are printed as 0; so are steady-state errors below this
+/// value.
 const ROUNDING: f64 = 1e-14;
 
 /// Prints the summary: gains, eigenvalues, robustness, families and schedules, detection, losses, checks that fail,

@@ -90,7 +90,7 @@ pub(super) fn path_in(version: Version, path: String) -> String {
     }
 }
 
-/// Returns an error with the findings about the libraries that are no notes, if there are any.
+/// Returns an error that lists the errors and warnings about the libraries, if there are any.
 fn refuse_broken(
     libraries: &[(String, Vec<u8>)],
     description: &ModelDescription,

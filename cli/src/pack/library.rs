@@ -40,8 +40,8 @@ pub(super) struct Toolchain {
 ///
 /// # Errors
 ///
-/// Returns an error, for the first two with the folder, if there is no such crate, if it is not a `cdylib`, or if it
-/// does not compile.
+/// Returns an error if there is no such crate or it is not a `cdylib` (both with its folder), or if it does not
+/// compile.
 pub(super) fn build(
     folders: &[PathBuf],
     locked: bool,
@@ -166,7 +166,7 @@ fn program(variable: &str, name: &str) -> OsString {
     std::env::var_os(variable).unwrap_or_else(|| name.into())
 }
 
-/// Returns what cargo says about the crate in `folder` and its dependencies on the target `host`.
+/// Returns cargo's metadata of the crate in `folder` and of its dependencies on the target `host`.
 fn metadata(folder: &Path, host: &str, locked: bool) -> anyhow::Result<Metadata> {
     let mut options = vec!["--filter-platform".to_owned(), host.to_owned()];
     options.extend(locked.then(|| "--locked".to_owned()));
@@ -181,10 +181,10 @@ fn metadata(folder: &Path, host: &str, locked: bool) -> anyhow::Result<Metadata>
 /// Builds the libraries of `members`, crates of the workspace of `source`, with the profile `fmu`;
 /// returns all artifacts.
 ///
-/// The libraries contain no local path, so that the same sources give the same bytes. Only code that a build script
-/// wrote has a path in the target folder. A flag that replaces this path would make cargo build everything again in a
-/// copy of the folder. So this function adds the flag, and builds again, only after it found the path in a library; a
-/// marker file keeps that for later calls.
+/// The libraries contain no local path, so that the same sources give the same bytes. Only code written by a build
+/// script can contain the path of the target folder. The flag that replaces this path has a cost: cargo builds
+/// everything again after the folder is moved. It is therefore added, in a second build, only if a library contains
+/// the path; a marker file records this for later calls.
 fn compile<'a>(
     source: &Source,
     members: impl Iterator<Item = &'a Source>,
@@ -229,8 +229,7 @@ fn call_cargo(
     let root = &metadata.workspace_root;
     let target = metadata.target_directory.join("libraries");
     let mut command = Command::new(program("CARGO", "cargo"));
-    // This depends on the workspace, not on the crates to pack, so that a crate has the same flags alone and with
-    // others.
+    // Depends on the workspace, not on the crates to pack, so that a crate always has the same flags.
     let alone = metadata.workspace_members.len() == 1;
     command.current_dir(&source.folder).arg(if alone { "rustc" } else { "build" }).args(ids);
     command.args(["--lib", "--profile", "fmu", "--message-format", "json-render-diagnostics"]);

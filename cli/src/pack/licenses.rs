@@ -57,8 +57,8 @@ fn line(package: &Crate) -> String {
 }
 
 /// Returns the files with licence texts: the one that the manifest states, and those of the first folder that has any,
-/// from that of the package upwards to its workspace. A package that is vendored or of a registry has its folder only:
-/// the folders above it have the licences of other packages.
+/// from the folder of the package upwards to its workspace. For a vendored or registry package only its own folder is
+/// searched, since the folders above belong to other packages.
 fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
     let stated = package.license_file().map(PathBuf::from).filter(|path| path.is_file());
     let is_from_registry =

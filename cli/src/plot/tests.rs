@@ -117,7 +117,7 @@ fn the_spike_of_one_sample_in_a_long_file_is_seen_at_its_place() {
         assert!((top.0 - 539.0).abs() < 0.2, "{name}: {top:?}");
         let others = curve.iter().filter(|point| (point.0 - top.0).abs() > 1.0);
         let next = others.map(|point| point.1).fold(f64::INFINITY, f64::min);
-        // 80 against 5 on an axis from -5 to 80.
+        // The spike is 80, other values are at most 5, and the axis of 420 units is from -5 to 80.
         assert!(next - top.1 > 0.7 * 420.0, "{name}: {next} below {top:?}");
         assert!(curve.len() < 4000, "{name}: {} points", curve.len());
     }
@@ -134,7 +134,7 @@ fn a_switch_is_drawn_as_stairs() {
     let folder = tempfile::tempdir().unwrap();
     let results = written(folder.path(), "run.parquet", 11);
     let curve = curves(&svg(&results, &["ctrl.on"])).remove(0);
-    // On from the sample at 5 s to that at 7 s, on an axis of 87.8 units per second.
+    // The switch is on from 5 s to 7 s; the axis has 87.8 units per second.
     let (low, high) = (curve[0].1, curve.iter().map(|point| point.1).fold(f64::MAX, f64::min));
     let on: Vec<f64> =
         curve.iter().filter(|point| point.1 < high + 0.1).map(|point| point.0).collect();

@@ -51,7 +51,7 @@ pub(super) fn facts(system: &System, plan: &Plan, plotted: &[String]) -> Run {
 }
 
 /// Returns the settings, the steps of signals and the faults of a scenario with their times; settings and faults after
-/// the `planned` ones are interventions. A fault without a time is from the `start` of the run on.
+/// the `planned` ones are interventions. A fault without a time starts at the `start` of the run.
 pub(super) fn marks(scenario: &Scenario, planned: PlannedEntries, start: f64) -> Vec<Mark> {
     let kind = |at: usize, planned: usize, kind| {
         if at < planned { kind } else { MarkKind::Intervention }
@@ -71,7 +71,7 @@ pub(super) fn marks(scenario: &Scenario, planned: PlannedEntries, start: f64) ->
     });
     let faults = scenario.fault.iter().enumerate().map(|(at, entry)| {
         let entry = entry.get_ref();
-        // The connection, and one table with the name of the kind.
+        // An entry has the connection and a table, whose name is the kind of the fault.
         let table = toml::Table::try_from(entry).unwrap_or_default();
         let body = table.iter().find_map(|(name, body)| Some((name, body.as_table()?)));
         let time = |name: &str| body?.1.get(name)?.as_float();

@@ -22,7 +22,7 @@ pub(super) const FILE: &str = "live.toml";
 const SIGNALS: usize = 500;
 /// Largest number of variables that can be set on the page.
 const SETTINGS: usize = 5000;
-/// Interval between two looks for a signal of the operating system while the run is paused.
+/// Interval between checks for a signal of the operating system while the run is paused.
 const LOOK: Duration = Duration::from_millis(50);
 /// Longest time that the command waits at its end until an open page has shown the end.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -48,12 +48,12 @@ pub(super) struct Live {
     start: Instant,
     /// Time of all pauses and requests.
     paused: Duration,
-    /// Lines of the file that repeats the run: what it is, the interventions, and the stop.
+    /// Comment lines of the file that repeats the run: its purpose, the interventions, and the stop.
     remarks: Vec<String>,
     /// The file that repeats the run, in the folder of the results. It has another name for a resumed run, so that it
     /// does not replace the file of the run before the checkpoint.
     file: PathBuf,
-    /// What is logged at the first write, if there is a file of an earlier run.
+    /// The message logged at the first write, if it replaces the file of an earlier run.
     replacement: Option<String>,
     /// Whether the page has stopped the run.
     pub(super) stopped: bool,

@@ -562,8 +562,8 @@ impl Options {
     }
 }
 
-/// Returns `path` with the ending of a format: in place of that of another format, otherwise behind the name, of which
-/// another ending is a part, as in `k=1.5`.
+/// Returns `path` with the extension of a format. It replaces `.csv` and `.parquet`; it is appended to any other name,
+/// whose last point may belong to a number, as in `k=1.5`.
 fn with_format(path: PathBuf, format: &str) -> PathBuf {
     if ["csv", "parquet"].iter().any(|ending| has_ending(&path, ending)) {
         return path.with_extension(format);
@@ -573,8 +573,8 @@ fn with_format(path: PathBuf, format: &str) -> PathBuf {
     name.into()
 }
 
-/// Returns the path of a file that a run resumed at `time` writes, in the folder of the file `path` of the run before.
-/// A pipe or device keeps its path.
+/// Returns the path of a file that a run resumed at `time` writes, in the folder of `path`, the file of the original
+/// run. A pipe or device keeps its path.
 fn resumed_path(path: &Path, time: f64) -> PathBuf {
     if is_stream(path) {
         return path.to_owned();
