@@ -1,4 +1,4 @@
-//! Configurations: a `system.toml` as text or as nested dicts, and the entries that a run replaces.
+//! Reads a `system.toml` given as text or as nested dicts, and merges the changes of a run into it.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use study::{Config, LoadedConfig};
 use crate::error;
 use crate::node::Node;
 
-/// Name of the file that a configuration given as text or dicts has in `folder`: its relative paths start there.
+/// File name assumed for a configuration given as text or dicts; relative paths start in the folder of this file.
 const NAME: &str = "system.toml";
 
 /// Reads the `system.toml` at `path`; returns its content with absolute paths.
@@ -52,7 +52,7 @@ pub(crate) fn read(description: &Bound<'_, PyAny>, folder: &Path) -> PyResult<Co
     parse(&text, &folder.join(NAME)).map_err(|place| {
         let shown = place.shown().trim();
         let before = text.lines().take(place.line().saturating_sub(1));
-        // A row of a list that has a line of its own has a comma.
+        // Unlike a table header, a line such as `[1, 2],` inside a list has a comma.
         let is_header = |line: &&str| {
             line.starts_with('[') && line.split('#').next().is_some_and(|code| !code.contains(','))
         };
@@ -77,9 +77,9 @@ fn plain(py: Python<'_>, mut config: Config) -> PyResult<Bound<'_, PyAny>> {
     node.to_python(py)
 }
 
-/// Replaces the entries of `base` that `changes` states, also settings of the same name and entries of
-/// `algorithm.every`; adds further ones, and all entries of the scenario. `stated` has the nested dicts of `changes`; an
-/// empty list in them clears the list. Covers the entries that a run may change, not the system itself.
+/// Applies `changes` to the entries of `base` that a run may change, which exclude the system itself. Replaces values,
+/// lists, settings of the same name and entries of `algorithm.every`; appends entries of the scenario. `stated` has the
+/// nested dicts of `changes`, which tell an empty list (it clears a list) from one that is not stated.
 pub(crate) fn merge(base: &mut Config, changes: Config, stated: &Bound<'_, PyAny>) {
     for (name, value, place) in changes.settings.0 {
         base.settings.0.retain(|(known, _, _)| *known != name);
@@ -94,7 +94,7 @@ pub(crate) fn merge(base: &mut Config, changes: Config, stated: &Bound<'_, PyAny
         let entries = stated.get_item(table);
         entries.and_then(|entries| entries.get_item(entry.replace('_', "-"))).is_ok()
     };
-    // Replaces each entry of the tables that is stated.
+    // Replaces each entry that `stated` contains.
     macro_rules! replace {
         ($($table:ident [$($entry:ident)*])*) => {
             $($(if is_stated(stringify!($table), stringify!($entry)) {

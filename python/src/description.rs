@@ -14,8 +14,8 @@ use crate::guard::guarded;
 /// Largest number of elements of an array whose start values are listed; a larger array has `None`.
 const ELEMENTS: usize = 1_000_000;
 
-/// Returns the model description of the FMU at `path` (an archive or a folder) as a dict; `warnings` lists the
-/// warnings about both.
+/// Returns the model description of the FMU at `path` (an archive or a folder) as a dict. Its entry `warnings` lists
+/// the warnings about the description and about the FMU.
 #[pyfunction]
 pub(crate) fn read_model_description(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     let unpacked = guarded(py, || {
@@ -29,8 +29,8 @@ pub(crate) fn read_model_description(py: Python<'_>, path: PathBuf) -> PyResult<
     Ok(described)
 }
 
-/// Returns the path of an FMU with a library for this platform: the FMU at `path`, or one that is built from it if it
-/// has source code only.
+/// Returns the path of an FMU with a library for this platform: `path`, or an FMU built from it if it has source code
+/// only.
 #[pyfunction]
 pub(crate) fn compile(py: Python<'_>, path: PathBuf) -> PyResult<PathBuf> {
     let compiled = guarded(py, || fmu_import::compile(&path))?;
@@ -134,8 +134,8 @@ pub(crate) fn variable(
     Ok(variable.unbind())
 }
 
-/// Returns the start value, for an array the list of its elements in row-major order; `None` without a start value and
-/// beyond [`ELEMENTS`].
+/// Returns the start value, for an array a list of its elements in row-major order; `None` without a start value and
+/// for an array with more than [`ELEMENTS`] elements.
 fn start<'py>(
     py: Python<'py>,
     declared: &ScalarVariable,

@@ -20,7 +20,7 @@ pub(crate) struct Designed {
     design: Mutex<design::Design>,
 }
 
-/// Calls `work` without the interpreter; raises its error as a `DesignError`.
+/// Calls `work` with the interpreter released; raises an error of `work` as a `DesignError`.
 fn detached<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> Result<T, design::Error> + Send,
@@ -45,7 +45,7 @@ pub(crate) fn design_plant(plant: &Bound<'_, PyAny>, path: PathBuf) -> PyResult<
     Ok(Designed { design: Mutex::new(design) })
 }
 
-/// The result of an identification: the text of a plant file, the reason why it has no controller, if so, and warnings.
+/// The result of an identification: the text of a plant file, the reason if the plant has no controller, and warnings.
 type Identification = (String, Option<String>, Vec<String>);
 
 /// Identifies a plant from the logs at `paths`.
@@ -71,7 +71,7 @@ type Rows = Vec<Vec<f64>>;
 type SourceFiles = (Vec<(PathBuf, String)>, Vec<String>);
 
 impl Designed {
-    /// Calls `work` with the design, which no other thread uses meanwhile.
+    /// Calls `work` with the design, locked against other threads.
     fn with<T>(&self, work: impl FnOnce(&mut design::Design) -> T) -> T {
         work(&mut self.design.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -103,8 +103,8 @@ impl Designed {
         text.map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// A, B, C, D of a system of the loop, and its sample time in s, `None` in continuous time. `ValueError` for an
-    /// unknown name.
+    /// The matrices A, B, C, D of the system `name` of the loop, and its sample time in s, `None` in continuous time.
+    /// Raises `ValueError` for an unknown name.
     fn system(&self, name: &str) -> PyResult<([Rows; 4], Option<f64>)> {
         let system = self.with(|design| {
             let whole = &design.closed_loop;
@@ -136,8 +136,8 @@ impl Designed {
         guarded(py, || self.with(|design| design.page()))
     }
 
-    /// The controller as source code: paths and contents of the files, and warnings. `rust`: a crate instead of
-    /// C; `single`: single precision.
+    /// The controller as source code: paths and contents of the files, and warnings. The code is C, or a crate if
+    /// `rust`, in double precision, or in single precision if `single`.
     fn code(&self, py: Python<'_>, rust: bool, single: bool) -> PyResult<SourceFiles> {
         let language = if rust { design::Language::Rust } else { design::Language::C };
         let precision = if single { design::Precision::Single } else { design::Precision::Double };
@@ -150,7 +150,7 @@ impl Designed {
         detached(py, || self.with(|design| design.kalman_fmu(&base)?.write(&path, &design.page())))
     }
 
-    /// Writes the controller for the estimates of that filter to `path`, from the packed controller at `base`.
+    /// Writes the controller that uses the estimates of `kalman_fmu` to `path`, from the packed controller at `base`.
     fn feedback_fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
         detached(py, || {
             self.with(|design| design.feedback_fmu(&base)?.write(&path, &design.page()))

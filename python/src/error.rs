@@ -53,7 +53,7 @@ impl Exception {
         }
     }
 
-    /// Returns the exception as an error of Python, or the error that prevents this.
+    /// Returns the exception as an error of Python, or the error that occurs while it is created.
     pub(crate) fn raise(self, py: Python<'_>) -> PyErr {
         self.object(py).map_or_else(|error| error, PyErr::from_value)
     }

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use crate::error::Exception;
 use crate::python_slave::Raised;
 
-/// Calls `work` without the interpreter. A panic becomes an exception.
+/// Calls `work` with the interpreter released. A panic becomes an exception.
 pub(crate) fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     let result = py.detach(|| catch_unwind(AssertUnwindSafe(work)));
     result.map_err(|panic| {
@@ -21,7 +21,7 @@ pub(crate) fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) 
 }
 
 /// Returns `exception` as an error of Python whose cause is the exception that a Python slave raised, if any. Returns
-/// the cause itself if it is no `Exception`, such as `KeyboardInterrupt`.
+/// the cause itself if it is a `BaseException` but no `Exception`, such as `KeyboardInterrupt`.
 pub(crate) fn with_cause(py: Python<'_>, exception: Exception, raised: &Raised) -> PyErr {
     let cause = raised.lock().unwrap_or_else(PoisonError::into_inner).take();
     let Some(cause) = cause else { return exception.raise(py) };

@@ -12,7 +12,7 @@ const CLOSE_DELAY: Duration = Duration::from_secs(2);
 /// A page on this machine that shows the runs of a campaign.
 #[pyclass(frozen)]
 pub(crate) struct LiveView {
-    /// `None` after the end.
+    /// `None` after [`LiveView::end`].
     view: Mutex<Option<View>>,
     address: String,
 }
@@ -61,8 +61,8 @@ impl LiveView {
         });
     }
 
-    /// Answers the requests of the page. `held` says whether the campaign is paused now; returns whether it is to be
-    /// paused from now on, and whether it is to be stopped.
+    /// Answers the requests of the page. `held` is whether the campaign is paused; returns whether it should be paused
+    /// from now on, and whether it should stop.
     fn attend(&self, mut held: bool) -> (bool, bool) {
         let mut stopped = false;
         self.with(|view| {

@@ -1,4 +1,4 @@
-//! A lock that keeps processes apart that write the same folder.
+//! A file lock, so that only one process writes into a folder.
 
 use std::fs::{File, TryLockError};
 use std::io::{self, ErrorKind};
@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 
 use pyo3::prelude::*;
 
-/// An exclusive lock on a file. It ends with [`FileLock::release`], and with the process, even by a crash.
+/// An exclusive lock on a file. It ends with [`FileLock::release`] and when the process ends, even by a crash.
 #[pyclass(frozen, module = "aso_ftc._core")]
 pub(crate) struct FileLock {
     /// `None` after the release, and where the file cannot be locked.
@@ -20,15 +20,15 @@ impl FileLock {
     fn release(&self) {
         let file = self.file.lock().unwrap_or_else(PoisonError::into_inner).take();
         if let Some(file) = file {
-            // Closing alone would leave the lock to a fork of this process.
+            // After a mere close, a fork of this process would still hold the lock.
             let _ = file.unlock();
         }
     }
 }
 
 /// Locks a file, which is created if it is missing. Returns `None` if another [`FileLock`], of this or another process,
-/// has the lock. Without locks in the file system, or the right to open the file, assumes that it is free. Raises
-/// `OSError` if the file cannot be opened for another reason.
+/// has the lock. If the file system has no locks, or the file may not be opened, returns a `FileLock` without a lock.
+/// Raises `OSError` if the file cannot be opened for another reason.
 #[pyfunction]
 pub(crate) fn lock_file(path: PathBuf) -> PyResult<Option<FileLock>> {
     let file = open(&path)?;

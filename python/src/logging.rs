@@ -1,8 +1,8 @@
 //! Messages of the libraries and of FMUs for Python's `logging`.
 //!
-//! The module `aso_ftc._logging` states the loggers. A message may arise in any thread, without the interpreter. So
-//! messages wait in a list until a thread that is attached to the interpreter passes them on: at the end of each call,
-//! and during a run each time that it looks for signals.
+//! The module `aso_ftc._logging` names the loggers. A thread that is not attached to the interpreter may also log, so
+//! messages wait in a list until an attached thread passes them on: at the end of each call from Python, and during a
+//! run at each check for signals.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -15,7 +15,7 @@ use tracing::span::{Attributes, Id, Record};
 use tracing::subscriber::Interest;
 use tracing::{Event, Level, Metadata, Subscriber};
 
-/// The module that states the loggers.
+/// The module that names the loggers.
 const MODULE: &str = "aso_ftc._logging";
 /// `target` of the messages of FMUs.
 const FMU: &str = "fmu";
@@ -26,10 +26,10 @@ const WAITING: usize = 10_000;
 static MESSAGES: Mutex<Vec<Message>> = Mutex::new(Vec::new());
 /// Number of messages that were dropped.
 static LOST: AtomicU64 = AtomicU64::new(0);
-/// The lowest level of `logging` that is passed on.
+/// The lowest level of `logging` that is passed on, at first 30 (`WARNING`).
 static LEAST: AtomicU8 = AtomicU8::new(30);
 
-/// A message: level of `logging`, the FMU that it is from, simulated time in s, category, text.
+/// A message: level of `logging`, name of the FMU that sent it, simulated time in s, category, text.
 struct Message {
     level: u8,
     fmu: Option<String>,
@@ -43,7 +43,7 @@ thread_local! {
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Calls `work`, without the messages of this thread if `quiet`.
+/// Calls `work`; if `quiet`, drops the messages of this thread meanwhile.
 pub(crate) fn quietly<T>(quiet: bool, work: impl FnOnce() -> T) -> T {
     let before = QUIET.replace(quiet);
     let result = catch_unwind(AssertUnwindSafe(work));
@@ -74,7 +74,7 @@ pub(crate) fn is_debugging() -> bool {
 ///
 /// # Errors
 ///
-/// The exception of a handler; the messages after this one are dropped.
+/// The exception of a logging handler; the messages after the one that caused it are dropped.
 pub(crate) fn pass_on(py: Python<'_>) -> PyResult<()> {
     let messages = {
         let mut waiting = MESSAGES.lock().unwrap_or_else(PoisonError::into_inner);

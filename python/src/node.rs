@@ -74,7 +74,7 @@ impl<'de> Visitor<'de> for NodeVisitor {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Node, A::Error> {
-        // The parser gives the entries in the order of their names.
+        // The parser returns the entries by name; their positions in the text restore the order.
         let mut entries: Vec<(String, Spanned<Node>)> = Vec::new();
         while let Some(entry) = map.next_entry()? {
             entries.push(entry);
@@ -136,12 +136,12 @@ impl Node {
     }
 }
 
-/// Returns the message `what` with the place of its value in front; the outermost value has no place.
+/// Returns the message `what`, prefixed with the place of the value that it is about; the outermost value has no place.
 fn at(place: &str, what: &str) -> String {
     if place.is_empty() { what.to_owned() } else { format!("{place}: {what}") }
 }
 
-/// Converts the value at `place`, which is `depth` values deep in the outermost one.
+/// Converts the value at `place`, which is nested in `depth` values.
 fn convert(value: &Bound<'_, PyAny>, place: &str, depth: usize) -> PyResult<Node> {
     if depth > DEPTH {
         return Err(PyValueError::new_err(at(place, &format!("more than {DEPTH} nested values"))));

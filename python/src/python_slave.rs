@@ -35,16 +35,16 @@ pub(crate) struct PythonSlave {
 }
 
 impl PythonSlave {
-    /// Describes `object` by its attributes `inputs` and `outputs`: names, or a mapping of names to start values
-    /// (`float`, `int` or `bool`, also of `NumPy`); without start values all are `float` and 0. The attribute `direct`
-    /// (default true) says whether outputs depend on the inputs of the same time. With functions `save` and `restore`
-    /// the slave can save its state.
+    /// Creates a slave from `object`. Its attributes `inputs` and `outputs` are names, or a mapping of names to start
+    /// values (`float`, `int` or `bool`, also of `NumPy`); a variable without a start value is a `float` and starts at
+    /// 0. The attribute `direct` (default true) says whether outputs depend on the inputs of the same time. With
+    /// functions `save` and `restore` the slave can save its state.
     ///
     /// # Errors
     ///
     /// `TypeError` if the object has no function `step`, an attribute is a text or a start value is no number;
-    /// `ValueError` if one is an array of several elements or an integer beyond 32 bits, or if two variables have one
-    /// name; an exception of the object.
+    /// `ValueError` if a start value is an array of several elements or an integer beyond 32 bits, or if two variables
+    /// have the same name; any exception that the object raises.
     pub(crate) fn new(name: &str, object: &Bound<'_, PyAny>, raised: Raised) -> PyResult<Self> {
         if !object.hasattr("step")? {
             let kind = object.get_type().name()?;
@@ -93,8 +93,7 @@ impl PythonSlave {
         Ok(Self { object, description, inputs, outputs, values, start, raised, saved, is_started })
     }
 
-    /// Runs `call` with the object; stores its exception as the cause of the error of the run. `function` is the name
-    /// in the error.
+    /// Runs `call` with the object. An exception becomes an error of `function`; `raised` then has the exception.
     fn call<T>(
         &self,
         function: &'static str,
@@ -120,8 +119,8 @@ impl PythonSlave {
         Ok(inputs)
     }
 
-    /// Returns position and value of each output in the answer of a call, none for `None`. A name that is no output is
-    /// an error, as is a number that is no integer of 32 bits for an output that starts with an integer.
+    /// Returns position and value of each output in the dict that a call returned; nothing for `None`. An unknown name
+    /// is an error; so is a value that is no integer of 32 bits if the output starts with an integer.
     fn read_outputs(&self, answer: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>> {
         if answer.is_none() {
             return Ok(Vec::new());
@@ -158,7 +157,7 @@ impl PythonSlave {
         }
     }
 
-    /// Reads values, converted; NaN stands for an unknown reference.
+    /// Reads and converts the values of `references`; an unknown reference has NaN.
     fn read<T>(&self, references: &[u32], values: &mut [T], convert: impl Fn(f64) -> T) {
         for (reference, value) in references.iter().zip(values) {
             let known = usize::try_from(*reference).ok().and_then(|k| self.values.get(k));
@@ -166,7 +165,7 @@ impl PythonSlave {
         }
     }
 
-    /// Writes values; an unknown reference is ignored.
+    /// Writes the values of `references`; ignores an unknown one.
     fn write(&mut self, references: &[u32], values: impl Iterator<Item = f64>) {
         for (reference, value) in references.iter().zip(values) {
             let place = usize::try_from(*reference).ok().and_then(|k| self.values.get_mut(k));
@@ -292,7 +291,7 @@ impl Slave for PythonSlave {
 }
 
 impl Drop for PythonSlave {
-    /// Stops an object whose run failed or whose simulation was not closed.
+    /// Calls the object's `stop` if its run failed or its simulation was not closed.
     fn drop(&mut self) {
         if self.is_started {
             // `None` while the interpreter shuts down.
@@ -330,8 +329,8 @@ impl Start {
     }
 }
 
-/// Checks the value of a variable that starts with an integer: it is an `Integer` of FMI 2.0. `what`: the kind of the
-/// value. On failure returns a sentence.
+/// Checks that a value is an `Integer` of FMI 2.0, as required of a variable that starts with an integer. Returns
+/// the error message otherwise, in which `what` says what the value is, such as "the output".
 fn check_integer(what: &str, name: &str, value: f64) -> Result<(), String> {
     if value.fract() == 0.0 && (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&value) {
         return Ok(());
@@ -341,8 +340,8 @@ fn check_integer(what: &str, name: &str, value: f64) -> Result<(), String> {
     ))
 }
 
-/// Returns the variables that an attribute of the object declares; none if the object lacks the attribute. `TypeError`
-/// for a text, whose letters are no names.
+/// Returns the variables that an attribute of the object declares; none if the object lacks the attribute. Raises
+/// `TypeError` for a text, which Python would iterate by letters.
 fn declarations(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(String, Start)>> {
     let Some(declaration) = object.getattr_opt(attribute)? else { return Ok(Vec::new()) };
     if declaration.is_instance_of::<PyString>() {
@@ -363,7 +362,7 @@ fn declarations(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(Str
 /// Reads a start value. A bool is an int in Python, so it is tested first.
 fn start(value: &Bound<'_, PyAny>) -> PyResult<Start> {
     use pyo3::types::{PyBool, PyInt};
-    // Scalars of `NumPy` are no int and no bool of Python; `item` converts them.
+    // `item` converts a scalar of `NumPy`, which is neither an int nor a bool of Python.
     let scalar = if value.hasattr("item")? { value.call_method0("item")? } else { value.clone() };
     if let Ok(boolean) = scalar.cast::<PyBool>() {
         return Ok(Start::Boolean(boolean.is_true()));
@@ -433,7 +432,7 @@ fn describe(
     }
 }
 
-/// Sets the entry of `inputs` for `variable`, in the type of the variable.
+/// Sets the entry of `inputs` for `variable`, converted to the type of the variable.
 #[expect(clippy::cast_possible_truncation, reason = "an integer")]
 fn set(inputs: &Bound<'_, PyDict>, variable: &ScalarVariable, value: f64) -> PyResult<()> {
     match &variable.kind {

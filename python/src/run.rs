@@ -25,12 +25,12 @@ use crate::table::Table;
 use crate::value;
 use crate::watch::{Cancel, Progress, Stop, Watch};
 
-/// The FMUs of this process, and the process that opened them.
+/// The FMUs of this process, and the identifier of the process that opened them.
 static STORE: LazyLock<(Store, u32)> = LazyLock::new(|| (Store::default(), std::process::id()));
-/// The program that becomes the separate process of an FMU.
+/// The program to start for an FMU in a separate process.
 static WORKER: OnceLock<PathBuf> = OnceLock::new();
 
-/// Sets the program that becomes the separate process of an FMU.
+/// Sets the program to start for an FMU in a separate process.
 #[pyfunction]
 pub(crate) fn set_worker(path: PathBuf) {
     // Only the first call has an effect: the program does not change while the package is imported.
@@ -60,7 +60,7 @@ pub(crate) struct Study {
     slaves: Vec<(String, Py<PyAny>)>,
 }
 
-/// A column of an input: its name, and times and values as the bytes of `f64`.
+/// An input over time: its name, and its times and values as the bytes of `f64`.
 type TableInMemory = (String, PyBackedBytes, PyBackedBytes);
 
 /// Slaves with the exceptions that they raise.
@@ -80,7 +80,7 @@ impl Study {
         Ok(Self { config, folder, slaves })
     }
 
-    /// Loads and connects the FMUs, and resolves all names; starts nothing. Returns the variables as dicts. `quiet`
+    /// Loads and connects the FMUs, and resolves all names, without a run. Returns the variables as dicts. If `quiet`,
     /// drops the messages, which a run of the same configuration repeats.
     #[pyo3(signature = (changes, *, quiet = false))]
     fn check(
@@ -105,8 +105,8 @@ impl Study {
         Ok(variables)
     }
 
-    /// Runs to the end. Returns the outcome, and the exception if the run failed or was ended after its start; an error
-    /// before the start is raised.
+    /// Runs to the end. Returns the outcome, and an exception if the run failed or was ended early; raises an error
+    /// that occurs before the start.
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     #[pyo3(signature = (changes, *, time_limit = None, cancel = None, progress = None, input = None, tables = None, prefix = None))]
     fn run(
@@ -131,7 +131,7 @@ impl Study {
         let run = result?.map_err(|error| with_cause(py, error::study(&error), &raised))?;
         let EndedRun { ended, time, steps, seconds, recorded, settings, reasons, mut watch } = run;
         let (recorded, binaries) = recorded;
-        // A limit or a request that is noticed after the last step has not ended the run.
+        // A time limit or a cancellation that is noticed only after the last step has not ended the run.
         if matches!(ended, RunEnd::AtStop | RunEnd::ByFmu(_))
             && !matches!(watch.stop, Some(Stop::Raised(_)))
         {
@@ -163,7 +163,7 @@ impl Study {
         Ok((outcome, exception.map(|error| error.into_value(py).into_any())))
     }
 
-    /// Initialises the FMUs for steps one by one, without a results file and without checkpoints.
+    /// Initialises the FMUs to be advanced step by step, without a results file and without checkpoints.
     fn simulation(&self, py: Python<'_>, changes: &Bound<'_, PyAny>) -> PyResult<Stepper> {
         logging::adopt_level(py);
         let (mut loaded, (slaves, raised)) = (self.with_changes(changes)?, self.slaves(py)?);
@@ -186,7 +186,7 @@ impl Study {
         Ok(LoadedConfig { config, source: None })
     }
 
-    /// Returns a table in memory, and the path by which the configuration refers to its name.
+    /// Returns the path by which the configuration refers to a table in memory, and the table.
     fn table(&self, (name, times, values): &TableInMemory) -> (PathBuf, Signals) {
         let numbers = |bytes: &[u8]| -> Arc<[f64]> {
             bytes.as_chunks().0.iter().map(|bytes| f64::from_ne_bytes(*bytes)).collect()
@@ -217,7 +217,7 @@ fn prepare(
     if loaded.config.isolation.isolate != Some(true)
         && let Ok(here) = std::env::current_dir()
     {
-        // If this fails, only the explanation of a crash is missing.
+        // The file explains a crash; the run does not depend on it.
         let _ = fmu_import::crash::leave_file(&here);
     }
     let worker = WORKER.get().map(PathBuf::as_path);
@@ -244,7 +244,7 @@ struct EndedRun {
     watch: Watch,
 }
 
-/// Runs to the end, without the interpreter.
+/// Runs to the end, with the interpreter released.
 fn run(
     loaded: LoadedConfig,
     slaves: Vec<(String, Box<dyn Slave>)>,
@@ -278,7 +278,7 @@ fn run(
     let finished = run.finish().map(|_| ()).and(run.finish_trace());
     let reasons = std::mem::take(&mut run.plan.reasons);
     drop(run);
-    // The rows are in memory, also if their file is not complete.
+    // The rows are in memory even if writing their file failed.
     let ended = match (ended, finished) {
         (RunEnd::Failed(error), _) | (_, Err(error)) => RunEnd::Failed(error),
         (ended, Ok(())) => ended,

@@ -31,23 +31,23 @@ impl Stepper {
     }
 
     fn lock<'a>(&'a self, py: Python<'_>) -> MutexGuard<'a, Option<Run>> {
-        // Another thread may make a step, and need the interpreter for it.
+        // Releases the interpreter while it waits: the thread that holds the lock may need it for a step.
         self.run.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Calls `work` with the run, and passes on the messages that it caused.
+    /// Calls `work` with the run; then passes on the messages that `work` caused.
     ///
     /// # Errors
     ///
     /// `RuntimeError` if the simulation is closed; the exception of a logging handler; the error of `work`.
     fn with<T>(&self, py: Python<'_>, work: impl FnOnce(&mut Run) -> PyResult<T>) -> PyResult<T> {
-        // The lock ends with this statement: a logging handler may use the simulation.
+        // This statement releases the lock, since a logging handler may use the simulation.
         let result = work(self.lock(py).as_mut().ok_or_else(closed)?);
         logging::pass_on(py)?;
         result
     }
 
-    /// Calls `work` with the run, without the interpreter, and passes on the messages that it caused.
+    /// Calls `work` with the run and with the interpreter released; then passes on the messages that `work` caused.
     ///
     /// # Errors
     ///
@@ -67,8 +67,8 @@ impl Stepper {
         result.ok_or_else(closed)
     }
 
-    /// Steps until `is_done` holds for the number of steps so far and the time, or the run is finished; returns the
-    /// number of steps. An exception of a signal ends the steps, too.
+    /// Steps until `is_done(steps so far, time)` is true, the run is finished or a signal raises an exception; returns
+    /// the number of steps.
     fn advance(
         &self,
         py: Python<'_>,

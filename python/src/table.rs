@@ -30,8 +30,8 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Takes over the memory of the columns. Their names lose `prefix`, unless `time` would remain. The columns named
-    /// in `binaries`, with prefix, were recorded as hexadecimal digits and become bytes.
+    /// Takes over the memory of the columns. Removes `prefix` from their names, unless the rest would be `time`. The
+    /// columns named in `binaries` (names with prefix) contain hexadecimal digits and become bytes.
     pub(crate) fn new(
         recorded: Columns,
         binaries: &HashSet<String>,
@@ -83,7 +83,7 @@ impl Table {
         bytes.map(|field| field.name().clone()).collect()
     }
 
-    /// Returns the columns as they were recorded, with bytes as hexadecimal digits, but under the names of this table.
+    /// Returns the columns under the names of this table, with bytes as hexadecimal digits.
     fn recorded(&self) -> Columns {
         let arrays = self.batch.columns().iter().skip(1);
         let columns = self.columns.iter().skip(1).cloned();

@@ -13,8 +13,8 @@ use crate::logging;
 
 /// Interval at which a run looks for signals, in wall-clock time.
 const INTERVAL: Duration = Duration::from_millis(20);
-/// Number of steps from one reading of the clock to the next, if the steps between the last two readings took less than
-/// [`SHORT`]; otherwise the clock is read after each step.
+/// Number of steps between two readings of the clock while they take less than [`SHORT`]; otherwise the clock is read
+/// after each step.
 const STRIDE: u32 = 8;
 const SHORT: Duration = Duration::from_millis(1);
 /// Number of parts of the progress bar.
@@ -64,7 +64,7 @@ pub(crate) enum Progress {
 }
 
 impl Progress {
-    /// `True` is a bar on standard error, a function receives the fraction, `None` and `False` are no progress.
+    /// `True`: a bar on standard error; a function: called with the fraction done; `None` and `False`: no progress.
     pub(crate) fn new(requested: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let Some(requested) = requested else { return Ok(Self::None) };
         if requested.is_callable() {
@@ -113,7 +113,7 @@ pub(crate) struct Watch {
     is_main: bool,
     /// Number of steps until the next reading of the clock.
     left: u32,
-    /// Number of steps between two readings; 0 before the first.
+    /// Number of steps between two readings of the clock; 0 before the first reading.
     stride: u32,
     last_reading: Instant,
     /// Time of the last call of [`Watch::look`].
@@ -154,8 +154,8 @@ impl Watch {
         })
     }
 
-    /// Checks after a step to `time` in s whether the run is to end, and sets `stop` then. Call it after every step; a
-    /// call before the first step is possible.
+    /// Call this after every step, with the time reached in s; a call before the first step is possible. Breaks and
+    /// sets `stop` if the run should end.
     #[inline]
     pub(crate) fn after_step(&mut self, time: f64) -> ControlFlow<()> {
         self.left -= 1;
@@ -168,7 +168,7 @@ impl Watch {
     #[cold]
     fn read_clock(&mut self, time: f64) -> ControlFlow<()> {
         let now = Instant::now();
-        // Before the first reading no step was timed.
+        // No step has been timed before the first reading.
         let is_short = self.stride > 0 && now - self.last_reading < SHORT;
         self.stride = if is_short { STRIDE } else { 1 };
         (self.last_reading, self.left) = (now, self.stride);
@@ -183,15 +183,14 @@ impl Watch {
         if self.stop.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// Reports the end of the run as progress. Sets `stop` to the exception of a signal that has arrived meanwhile, or
-    /// of the progress function.
+    /// Reports the run as done. Sets `stop` to an exception of a signal or of the progress function, if there is one.
     pub(crate) fn finish(&mut self, py: Python<'_>) {
         let finished = py.check_signals().and_then(|()| self.progress.show(py, 1.0));
         self.stop = finished.err().map(Stop::Raised);
     }
 
-    /// Checks signals, passes on messages and reports the progress, in the main thread or if there is a progress to
-    /// report. An exception sets `stop`.
+    /// Checks signals, passes on messages and reports the progress. Does nothing outside of Python's main thread unless
+    /// progress is requested. An exception sets `stop`.
     fn look(&mut self, time: f64) {
         if !self.is_main && matches!(self.progress, Progress::None) {
             return;
