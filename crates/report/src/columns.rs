@@ -1,4 +1,4 @@
-//! The numbers of a page: compressed columns, each once.
+//! The numbers of a page, as compressed columns; equal columns are stored once.
 
 use std::collections::HashMap;
 
@@ -7,7 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use miniz_oxide::deflate::compress_to_vec_zlib;
 use serde::Serialize;
 
-/// Level of the compression, of 0 to 10.
+/// Level of the compression, from 0 to 10.
 const LEVEL: u8 = 6;
 
 /// The columns of a page, by number. Equal columns, as those of connected variables, have the same number.

@@ -170,7 +170,7 @@ pub(crate) fn compare(
     })
 }
 
-/// Returns the names of the columns of `table` at `positions`, except the time, that `other` does not have.
+/// Returns the names of the columns of `table` at `positions` that `other` does not have, except the time.
 pub(crate) fn missing(table: &Table, positions: &[usize], other: &Table) -> Vec<String> {
     let columns = positions.iter().filter(|at| **at != table.time());
     let names = columns.map(|at| &table.columns()[*at].name);
@@ -180,7 +180,7 @@ pub(crate) fn missing(table: &Table, positions: &[usize], other: &Table) -> Vec<
 
 /// Number of rows of the other run that its thread sends at once.
 const BATCH: usize = 1024;
-/// Largest number of such batches that wait for the comparison.
+/// Largest number of batches of rows that wait for the comparison.
 const BATCHES: usize = 8;
 
 /// A row: its time and its values.
@@ -208,15 +208,15 @@ fn send_rows(
 /// The rows of the other run around the present time of the comparison.
 struct Series {
     receiver: Receiver<VecDeque<Row>>,
-    /// The rest of the last batch.
+    /// The rows of the last batch received that follow `next`.
     rows: VecDeque<Row>,
     /// The last row up to the present time.
     before: Option<Row>,
-    /// The row after it.
+    /// The row after `before`.
     next: Option<Row>,
-    /// The first and the last time of [`Series::advance_to`].
+    /// The times of the first and of the last call of [`Series::advance_to`].
     requested: Option<(f64, f64)>,
-    /// Number of rows before the first of these times.
+    /// Number of rows before the time of the first call.
     early: u64,
 }
 
@@ -229,7 +229,7 @@ impl Series {
         series
     }
 
-    /// Advances by one row; waits for it.
+    /// Waits for the next row and advances by one row.
     fn advance(&mut self) {
         if self.rows.is_empty() {
             self.rows = self.receiver.recv().unwrap_or_default();
@@ -238,9 +238,9 @@ impl Series {
             std::mem::replace(&mut self.next, self.rows.pop_front()).or(self.before.take());
     }
 
-    /// Advances to `time`, which does not decrease from call to call; returns the fraction of the time from the row
-    /// before to the next row, `None` outside of the run. Further calls with the time of several rows advance by one
-    /// row each, up to the last of them.
+    /// Advances to `time`, which must not decrease from call to call. Returns the position of `time` between the rows
+    /// `before` (0) and `next` (1), `None` outside of the run. If several rows have this time, each further call with
+    /// it advances by one of them.
     #[expect(clippy::float_cmp, reason = "rows of the same time")]
     fn advance_to(&mut self, time: f64) -> Option<f64> {
         let is_first = self.requested.is_none();
@@ -261,8 +261,8 @@ impl Series {
         Some((time - start) / (end - start))
     }
 
-    /// Returns the value of a column at this fraction between the rows: interpolated, or the value of the row before if
-    /// the column is held.
+    /// Returns the value of a column at the position `fraction` between the two rows: interpolated linearly, or the
+    /// value of the row `before` if the column is held.
     fn value(&self, column: usize, fraction: f64, is_held: bool) -> f64 {
         let value = |row: &Option<Row>| row.as_ref().map_or(f64::NAN, |row| row.1[column]);
         if is_held || fraction == 0.0 {
@@ -271,8 +271,8 @@ impl Series {
         value(&self.before) * (1.0 - fraction) + value(&self.next) * fraction
     }
 
-    /// Reads the rest, and returns the number of rows before the first and after the last time of
-    /// [`Series::advance_to`]; 0 if it was not called.
+    /// Reads the remaining rows. Returns the number of rows outside of the times of the first and the last call of
+    /// [`Series::advance_to`]; 0 without a call.
     fn outside(&mut self) -> u64 {
         let Some((_, last)) = self.requested else { return 0 };
         let mut outside = self.early;
@@ -293,7 +293,7 @@ struct Sum {
     largest: (f64, f64),
     /// Sum of the squares of the differences.
     squares: f64,
-    /// Sum of the squares of the scaled differences, for differences whose squares overflow.
+    /// Sum of the squares of the differences times [`SCALE`], for differences whose squares overflow.
     scaled_squares: f64,
     rows: u64,
     /// The smallest and the largest finite value of both runs.
@@ -317,7 +317,7 @@ impl Sum {
         if value.is_nan() && other.is_nan() {
             return;
         }
-        // A value that is not finite differs by infinity from every other value, and not from itself.
+        // A value that is not finite differs by infinity from every other value.
         let difference = if value.to_bits() == other.to_bits() { 0.0 } else { value - other };
         let size = if difference.is_nan() { f64::INFINITY } else { difference.abs() };
         if size > self.largest.0 {

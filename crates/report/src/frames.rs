@@ -37,7 +37,7 @@ impl Message {
 
     fn push(&mut self, time: f64) {
         let interval = time - self.last;
-        // Before the second frame both are NaN: `min` and `max` then return the interval.
+        // Both are NaN until the second frame: `min` and `max` then return the interval.
         self.shortest = self.shortest.min(interval);
         self.longest = self.longest.max(interval);
         self.intervals.push((time, 1e3 * interval));
@@ -78,7 +78,7 @@ pub(crate) fn read(path: &Path, (from, to): (f64, f64)) -> Result<Vec<Message>, 
     Ok(messages.into_values().collect())
 }
 
-/// Returns time, bus and identifier of a line, `error` for an error frame; `None` if it is no frame.
+/// Parses a frame: time, bus, and identifier, which is `error` for an error frame. `None` if the line is no frame.
 fn parse(line: &str) -> Option<(f64, &str, &str)> {
     let (time, rest) = line.trim_start().strip_prefix('(')?.split_once(')')?;
     let (bus, frame) = rest.trim().split_once(char::is_whitespace)?;

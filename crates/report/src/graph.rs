@@ -16,7 +16,7 @@ const EDGE: usize = 12;
 const LETTERS: usize = 20;
 
 /// Draws the system. An FMU is to the right of the FMUs that it depends on; arrows that close a loop return below the
-/// boxes. The arrows name their connections in a tooltip; the list of connections says the same as text.
+/// boxes. The tooltip of an arrow lists its connections.
 pub(crate) fn graph(run: &Run) -> Markup {
     let mut arrows: BTreeMap<(usize, usize), Vec<&Connection>> = BTreeMap::new();
     for connection in &run.connections {
@@ -69,7 +69,7 @@ fn arrow(from: Corner, to: Corner, connections: &[&Connection]) -> Markup {
             (usize::midpoint(x, end_x), usize::midpoint(y, end_y)),
         )
     } else {
-        // Back to the left: from the lower edge to the lower edge, below the boxes.
+        // An arrow that closes a loop returns to the left below the boxes, from lower edge to lower edge.
         let (x, y) = (from.0 + WIDTH * 2 / 3, from.1 + HEIGHT);
         let (end_x, end_y) = (to.0 + WIDTH / 3, to.1 + HEIGHT);
         let below = y.max(end_y) + DOWN * 3 / 4;
@@ -92,7 +92,7 @@ fn arrow(from: Corner, to: Corner, connections: &[&Connection]) -> Markup {
     }
 }
 
-/// Returns the name that output and input of a single connection have, otherwise the number of connections.
+/// Returns the name of a single connection whose output and input have the same name, otherwise the number of them all.
 fn label_of(connections: &[&Connection]) -> String {
     match connections {
         [only] if only.output == only.input => short(&only.output),
@@ -101,7 +101,7 @@ fn label_of(connections: &[&Connection]) -> String {
     }
 }
 
-/// Returns a name with at most [`LETTERS`] characters, the last one an ellipsis if it is shortened.
+/// Shortens a name to at most [`LETTERS`] characters, the last one an ellipsis.
 fn short(name: &str) -> String {
     if name.chars().count() <= LETTERS {
         return name.to_owned();
@@ -126,7 +126,7 @@ fn columns(count: usize, arrows: &BTreeMap<(usize, usize), Vec<&Connection>>) ->
     columns
 }
 
-/// The state of an FMU in the search: not visited, on the path to the present FMU, or left.
+/// The state of an FMU in the depth-first search: not visited, on the path to the present FMU, or completed.
 #[derive(Clone, Copy, PartialEq)]
 enum State {
     New,
@@ -134,7 +134,6 @@ enum State {
     Done,
 }
 
-/// A depth-first search.
 struct Order<'a> {
     arrows: &'a BTreeMap<(usize, usize), Vec<&'a Connection>>,
     state: Vec<State>,
@@ -146,8 +145,8 @@ struct Order<'a> {
 
 impl Order<'_> {
     fn visit(&mut self, fmu: usize) {
-        // An explicit stack: a chain of thousands of FMUs must not exhaust the stack of the thread. Each FMU is pushed
-        // a second time below its successors, to be left after them.
+        // An explicit stack, because recursion over a chain of thousands of FMUs could exhaust the stack of the thread.
+        // Each FMU is pushed again below its successors, to be completed after them.
         let mut open = vec![(fmu, false)];
         while let Some((fmu, is_visited)) = open.pop() {
             if is_visited {

@@ -31,7 +31,7 @@ pub use statistics::{Basis, Statistics};
 /// Largest number of variables in a report.
 pub const VARIABLES: usize = 300;
 
-/// Largest number of marks of a kind on the axis of time.
+/// Largest number of marks of each kind on the time axis.
 const MARKS: usize = 1000;
 
 /// What a report shows.
@@ -57,9 +57,9 @@ pub struct Request<'a> {
 /// The properties of a run that its results file does not contain.
 #[derive(Debug, Default)]
 pub struct Run {
-    /// A sentence: the time that it reached, and how long it took.
+    /// A sentence on the time reached and the duration of the run.
     pub outcome: String,
-    /// Whether it ended early.
+    /// Whether the run ended early.
     pub failed: bool,
     /// The FMUs, in the order of the system.
     pub fmus: Vec<Fmu>,
@@ -82,20 +82,20 @@ pub struct Run {
 /// A warning or an error of a run.
 #[derive(Clone, Debug)]
 pub struct Message {
-    /// Its time in s, if it has one.
+    /// Simulated time in s, if the message has one.
     pub time: Option<f64>,
     /// The sentence.
     pub text: String,
 }
 
-/// A mark on the axis of time, for an event of the run.
+/// A mark on the time axis, for an event of the run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Mark {
-    /// Its kind.
+    /// The kind of the mark.
     pub kind: MarkKind,
-    /// Its time in s, or its start.
+    /// Time or start of the event in s.
     pub time: f64,
-    /// Its end in s, if it has one.
+    /// End of the event in s, if it lasts.
     pub end: Option<f64>,
     /// What happened.
     pub text: String,
@@ -129,13 +129,13 @@ impl MarkKind {
 /// An FMU of a run.
 #[derive(Debug)]
 pub struct Fmu {
-    /// Its name in the system.
+    /// The name of the FMU in the system.
     pub name: String,
-    /// What it is: model, version of FMI, interface, tool.
+    /// Model, version of FMI, interface and tool.
     pub details: Vec<String>,
 }
 
-/// A connection from an output to an input; FMUs by their position in [`Run::fmus`].
+/// A connection from an output to an input. FMUs are stated by their position in [`Run::fmus`].
 #[derive(Debug)]
 pub struct Connection {
     /// The FMU of the output.
@@ -176,9 +176,9 @@ pub enum Error {
     #[error("{file}: no row {}", interval((*from, *to)))]
     NoRows {
         file: String,
-        /// The start of the range, negative infinity for that of the file.
+        /// The start of the range; negative infinity: the start of the file.
         from: f64,
-        /// Its end, positive infinity for that of the file.
+        /// The end of the range; positive infinity: the end of the file.
         to: f64,
     },
     /// A bus trace cannot be read.
@@ -193,7 +193,7 @@ pub enum Error {
         file: String,
         /// The number of the line.
         line: usize,
-        /// Its start.
+        /// The start of the line.
         actual: String,
     },
     /// The two files have no variable with numbers in common.
@@ -201,8 +201,8 @@ pub enum Error {
     Apart { file: String, other: String },
 }
 
-/// Returns the text by which a later report recognises a report of a results file with the name of `results`, in any
-/// folder, which it may replace. Characters that the page has in another form are `_`.
+/// Returns the text that marks a report of a results file of this name, in any folder. A later report of such a file
+/// may replace a page that contains this text. Characters that HTML escapes are replaced by `_`.
 #[must_use]
 pub fn identity(results: &Path) -> String {
     let identity = format!("aso-ftc report of {}", name(results));
@@ -211,9 +211,9 @@ pub fn identity(results: &Path) -> String {
 
 /// Creates the report of a results file.
 ///
-/// At most [`VARIABLES`] variables are shown; the page says how many are left out. It has all rows, unless these are
-/// more than two million values; then each plot says how many of the rows it has. Files are read row by row, the first
-/// one for the statistics and, together with the second one, for the plots: the memory does not depend on their length.
+/// At most [`VARIABLES`] variables are shown; the page says how many are left out. The plots have all rows, unless
+/// these are more than two million values; then each plot says how many of the rows it has. Files are read row by row
+/// (the first one twice: for the statistics, then for the plots), so that the memory does not depend on their length.
 ///
 /// # Errors
 ///
@@ -332,7 +332,7 @@ struct FirstPass {
     left_out: usize,
 }
 
-/// Reads the results file once for the statistics; again for each variable of a CSV file that turns out to be a text.
+/// Reads the results file for the statistics, once, and again for each column of a CSV file that turns out to be texts.
 fn read(view: &View<'_>, request: &Request<'_>) -> Result<FirstPass, Error> {
     let table = view.table;
     let selection = Selection { include: request.variables.to_vec(), exclude: Vec::new() };
@@ -380,16 +380,16 @@ fn read(view: &View<'_>, request: &Request<'_>) -> Result<FirstPass, Error> {
     }
 }
 
-/// The times that several consecutive rows have, as at events.
+/// The times that occur in several consecutive rows, as at events.
 #[derive(Default)]
 struct Events {
     /// The first [`MARKS`] of these times.
     times: Vec<f64>,
-    /// The number of all of them.
+    /// The number of all such times.
     count: usize,
     /// The time of the row before.
     before: Option<f64>,
-    /// The last of these times.
+    /// The last time that occurred in several rows.
     last: Option<f64>,
 }
 
@@ -413,7 +413,7 @@ fn with_unit(column: &Column, request: &Request<'_>) -> Column {
     Column { unit, ..column.clone() }
 }
 
-/// Returns a range of times for a sentence; one of its ends may be infinite.
+/// Formats a range of times for a sentence; one end may be infinite.
 fn interval((from, to): (f64, f64)) -> String {
     if from.is_infinite() {
         format!("up to t = {to} s")
@@ -434,7 +434,7 @@ fn is_held(column: &Column) -> bool {
     !matches!(column.kind, ColumnKind::Real)
 }
 
-/// Returns a list of names for a sentence: at most `limit` of them, and how many more there are.
+/// Formats names for a sentence: at most `limit` of them, and the number of further ones.
 fn listed(names: &[String], limit: usize) -> String {
     let more = names.len().saturating_sub(limit);
     let shown = names.iter().take(limit).cloned().collect::<Vec<_>>().join(", ");

@@ -25,7 +25,7 @@ const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 /// Largest number of entries of a list: marks, messages, connections, identifiers, names.
 const LISTED: usize = 200;
-/// Largest number of rows of a table that is not folded, and number of differences above the fold.
+/// Largest number of rows of a table that is not folded, and number of differences that are shown unfolded.
 const OPEN: usize = 10;
 /// The range of all times.
 const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -42,10 +42,10 @@ pub(crate) struct Content<'a> {
     pub(crate) texts: &'a [String],
     /// Number of variables that are not shown.
     pub(crate) left_out: usize,
-    /// The messages of the bus trace, if there is one.
+    /// The frames of the bus trace by bus and identifier, if there is a trace.
     pub(crate) frames: Option<&'a [frames::Message]>,
     pub(crate) comparison: Option<&'a Comparison>,
-    /// The first plots, for a reader without JavaScript.
+    /// The first plots as SVG, for a reader without JavaScript.
     pub(crate) picture: String,
 }
 
@@ -57,7 +57,7 @@ struct Data<'a> {
     marks: &'a [Mark],
     /// The times of events.
     events: &'a [f64],
-    /// See [`command`].
+    /// The result of [`command`].
     command: String,
 }
 
@@ -174,7 +174,7 @@ fn largest(comparison: &Comparison, other: &str) -> Markup {
     }
 }
 
-/// Returns the marks in the order of their times: at most [`MARKS`] of the run, and as many messages with a time.
+/// Returns the marks in the order of their times: up to [`MARKS`] of the run, and up to [`MARKS`] messages with a time.
 fn marks(run: Option<&Run>) -> Vec<Mark> {
     let Some(run) = run else { return Vec::new() };
     let messages = run.messages.iter().filter_map(|message| {
@@ -292,7 +292,7 @@ fn controls(other: Option<&str>) -> Markup {
     }
 }
 
-/// Returns the command for a page of the same files, quoted for a shell; without range, variables, units and trace.
+/// Returns the command for a page of the same files, quoted for a shell. It omits range, variables, units and trace.
 fn command(request: &Request<'_>) -> String {
     let is_plain = |sign: char| sign.is_ascii_alphanumeric() || "_-./".contains(sign);
     let quoted = |path: &Path| {
@@ -321,7 +321,7 @@ fn short(value: f64) -> String {
     }
 }
 
-/// Says over what the mean and the rms of a variable are taken.
+/// Returns the quantity over which the mean and the rms of a variable are taken, as text.
 fn basis(statistics: &Statistics) -> String {
     match statistics.basis {
         Basis::Time(length) => format!("time, {} s", short(length)),

@@ -11,7 +11,7 @@ use crate::samples::Samples;
 
 /// Largest size of the picture in bytes.
 const BYTES: usize = 300_000;
-/// Largest number of plots in it.
+/// Largest number of plots in the picture.
 const PANELS: usize = 6;
 /// The colours of the curves, in their order.
 const INKS: [Ink; 7] =

@@ -1,4 +1,4 @@
-//! The plots of a page: variables grouped by FMU, unit and size, and the rows that each plot has.
+//! The plots of a page: groups variables by FMU, unit and size, and selects the rows of each plot.
 
 use results::Column;
 use serde::Serialize;
@@ -15,28 +15,28 @@ const CURVES: usize = 7;
 const VALUES: usize = 2_000_000;
 /// Least number of blocks of rows of a plot.
 const BLOCKS: usize = 300;
-/// Largest ratio of the sizes of two curves in a plot. Beyond it the smaller one would look like a straight line.
+/// Largest ratio of the sizes of two curves in a plot; beyond it, the smaller one would look like a straight line.
 const RATIO: f64 = 30.0;
-/// Largest number of plots of variables that are not folded.
+/// Largest number of plots that are not folded.
 const SHOWN: usize = 6;
 
 /// Variables of an FMU with the same unit and similar size, which share a plot.
 pub(crate) struct Group {
-    /// The rank of its most important variable, and the position of its FMU.
+    /// The rank of the group's most important variable, and the position of its FMU.
     key: (Rank, usize),
     /// Whether no variable changes.
     pub(crate) is_flat: bool,
     pub(crate) unit: String,
-    /// The positions of its variables among the columns.
+    /// The positions of the group's variables among the columns.
     pub(crate) members: Vec<usize>,
-    /// The largest absolute value of its first variable.
+    /// The largest absolute value of the group's first variable.
     size: f64,
     /// Number of rows of a block of the [`Collector`]; 1 if all rows remain.
     pub(crate) block: usize,
 }
 
 impl Group {
-    /// Whether it is shown first: a variable is plotted by the configuration, connected or an output.
+    /// Whether the group is among the first: its variables are plotted by the configuration, connected or outputs.
     fn is_first(&self) -> bool {
         self.key.0 < Rank::Other
     }
@@ -52,8 +52,8 @@ impl Group {
     }
 }
 
-/// Groups the columns in the order in which they are shown, and decides how many of the `rows` each plot has.
-/// `is_paired`: there is a second run.
+/// Groups the columns in the order in which they are shown, and decides how many of the `rows` each plot keeps.
+/// `is_paired` is whether there is a second run.
 pub(crate) fn groups(
     columns: &[Column],
     statistics: &[Statistics],
@@ -83,7 +83,7 @@ pub(crate) fn groups(
     groups.sort_by_key(|group| group.key);
     let runs = if is_paired { 2 } else { 1 };
     let flat = statistics.iter().filter(|one| is_flat(one)).count();
-    // Columns that do not change are small in the file; they need memory in the browser only.
+    // A column that does not change takes memory in the browser but almost none in the file.
     let share = VALUES / (runs * (statistics.len() - flat) + flat / 32).max(1);
     if rows > share {
         for group in &mut groups {
@@ -98,20 +98,20 @@ pub(crate) fn groups(
 /// The data of all plots.
 #[derive(Default, Serialize)]
 pub(crate) struct Plots {
-    /// The times of the rows that plots have.
+    /// The times of the rows of the plots.
     grids: Vec<Grid>,
     #[serde(rename = "plots")]
     all: Vec<Plot>,
     columns: Columns,
 }
 
-/// The rows that one or more plots have.
+/// The times of the rows of one or more plots.
 #[derive(Serialize, PartialEq, Eq)]
 struct Grid {
     /// Column of the times in s.
     time: usize,
     rows: usize,
-    /// The number of all rows, of which the plots may have only some.
+    /// The number of all rows; the plots may have fewer.
     total: usize,
 }
 
@@ -120,7 +120,7 @@ struct Plot {
     /// The FMU of the variables; empty if there is none.
     fmu: String,
     unit: String,
-    /// Whether it is not folded.
+    /// Whether the plot is not folded.
     shown: bool,
     grid: usize,
     curves: Vec<Curve>,
@@ -140,9 +140,9 @@ struct Curve {
 }
 
 impl Plots {
-    /// Adds the plots of the groups. The samples of each have the columns of this run, then the columns of the other
-    /// one; `is_compared` says which variables the other one has. The first [`SHOWN`] plots are not folded, as far as
-    /// their groups are shown first, or if no group is.
+    /// Adds the plots of the groups. The samples of a group have the columns of this run, then those of the other run;
+    /// `is_compared` says which variables the other run has. Of the first [`SHOWN`] plots, those with
+    /// [`Group::is_first`] are not folded; if no group has it, none of them is folded.
     pub(crate) fn add_all(
         &mut self,
         groups: &[(&Group, &Samples)],
@@ -182,8 +182,7 @@ impl Plots {
         curves.collect()
     }
 
-    /// Adds the plots of the times between the frames of each message. A plot with at most [`SHOWN`] plots before it is
-    /// not folded.
+    /// Adds the plots of the times between the frames of each message.
     pub(crate) fn add_frames(&mut self, messages: &[Message]) {
         let share = VALUES / messages.len().max(1);
         for group in messages.chunks(CURVES) {
@@ -203,7 +202,7 @@ impl Plots {
         }
     }
 
-    /// Adds the times of the rows, unless there is an equal grid; returns the number of the grid.
+    /// Adds the times of the samples, unless there is an equal grid; returns the number of the grid.
     fn grid(&mut self, samples: &Samples) -> usize {
         let time = self.columns.add(&samples.time);
         let grid = Grid { time, rows: samples.time.len(), total: samples.total };

@@ -1,4 +1,4 @@
-//! The rows of a plot: all rows of a short run, the rows with the extremes of the curves of a longer one.
+//! The rows of a plot: all rows of a short run; of a longer run, the rows with the extremes of the curves.
 
 /// Rows of some columns.
 #[derive(Debug, Default)]
@@ -6,23 +6,23 @@ pub(crate) struct Samples {
     pub(crate) time: Vec<f64>,
     /// The values of each column, as many as there are times.
     pub(crate) columns: Vec<Vec<f64>>,
-    /// The number of all rows, of which these may be only some.
+    /// The number of all rows of the run; the samples may have fewer.
     pub(crate) total: usize,
 }
 
 /// Collects the rows of a plot one by one.
 ///
-/// Whole rows of each block of neighbouring rows remain: the rows at which a column, or the difference of a pair of
-/// columns, is lowest or highest, and the first and the last row at which it has no finite value. The first and the
-/// last row of all remain, too.
+/// Of each block of consecutive rows, keeps the rows at which a column, or the difference of a pair of columns, is
+/// lowest or highest, and the first and the last row at which it has no finite value. Also keeps the first and the last
+/// row of the run.
 pub(crate) struct Collector {
-    /// The rows that remain.
+    /// The rows that are kept.
     samples: Samples,
     /// The rows of the present block.
     block: Samples,
-    /// Number of rows of a block; all rows remain if it is 1.
+    /// Number of rows of a block; 1: all rows are kept.
     length: usize,
-    /// Whether the columns are pairs, each of one of the first half and one of the second half.
+    /// Whether the columns are pairs: column k of the first half and column k of the second half.
     is_paired: bool,
     /// Whether the present block is the last one.
     is_last: bool,
@@ -34,7 +34,7 @@ impl Collector {
         Self { samples: empty(), block: empty(), length, is_paired, is_last: false }
     }
 
-    /// Returns the largest number of rows that remain of a block, not counting the first and the last row of all.
+    /// Returns the largest number of rows kept of a block, not counting the first and the last row of the run.
     pub(crate) fn max_rows(columns: usize, is_paired: bool, has_gaps: bool) -> usize {
         let curves = if is_paired { columns + columns / 2 } else { columns };
         curves * if has_gaps { 4 } else { 2 }
@@ -56,7 +56,7 @@ impl Collector {
         self.samples
     }
 
-    /// Moves the rows that remain from the block to the samples, and empties the block.
+    /// Moves the rows to keep from the block to the samples, and empties the block.
     fn reduce(&mut self) {
         let rows = self.block.time.len();
         let mut marks = vec![false; rows];
@@ -89,8 +89,8 @@ impl Collector {
     }
 }
 
-/// Returns the rows of the lowest and the highest finite value, and the first and the last row without a finite value,
-/// the last only if there are two; `None` for each that does not exist.
+/// Returns the rows with the lowest and the highest finite value, and the first and the last row without a finite
+/// value; `None` for a row that does not exist, and for the last if it is the first.
 fn extremes(values: impl Iterator<Item = f64> + Clone) -> [Option<usize>; 4] {
     let finite = || values.clone().enumerate().filter(|(_, value)| value.is_finite());
     let lowest = finite().min_by(|one, other| one.1.total_cmp(&other.1));

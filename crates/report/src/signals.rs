@@ -1,4 +1,4 @@
-//! The variables of a report: to which FMU each belongs, and which ones are shown first.
+//! The FMU of each variable of a report, and the order in which variables are shown.
 
 use std::collections::HashSet;
 
@@ -6,17 +6,17 @@ use results::{Column, Selection};
 
 use crate::{Connection, Run};
 
-/// Largest number of FMUs that are taken from the names of the columns, for a file without a run.
+/// Largest number of FMUs that are taken from the names of the columns, if the run is not known.
 const NAMED: usize = 8;
 
-/// How soon a variable is shown.
+/// The importance of a variable: lower ranks are shown first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Rank {
-    /// The configuration asks for its plot.
+    /// The configuration plots the variable.
     Asked,
-    /// It is an output that is connected, or an input on which a fault acts.
+    /// A connected output, or an input on which a fault acts.
     Connected,
-    /// It is an output without a connection.
+    /// An output without a connection.
     Output,
     /// Any other variable.
     Other,
@@ -49,8 +49,8 @@ impl Signals {
     }
 }
 
-/// Returns the different parts of the names before the first point; none if a name has no point or if there are more
-/// than [`NAMED`].
+/// Returns the distinct parts of the names before the first point; none if a name has no point or if there are more
+/// than [`NAMED`] parts.
 fn first_parts(names: &[&str]) -> Vec<String> {
     let mut parts: Vec<String> = Vec::new();
     for name in names {
@@ -63,7 +63,7 @@ fn first_parts(names: &[&str]) -> Vec<String> {
     parts
 }
 
-/// Returns the position of the FMU with the longest name that `name` starts with; the last position if there is none.
+/// Returns the position in `fmus` of the longest FMU name that `name` starts with; the last position if there is none.
 fn position(fmus: &[String], name: &str) -> usize {
     let is_of = |fmu: &str| name.strip_prefix(fmu).is_some_and(|rest| rest.starts_with('.'));
     let matching = fmus.iter().enumerate().filter(|(_, fmu)| !fmu.is_empty() && is_of(fmu));

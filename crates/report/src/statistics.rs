@@ -35,10 +35,10 @@ pub enum Basis {
     Values(u64),
 }
 
-/// Factor of values before they are squared a second time: those squares do not overflow.
+/// Factor by which values are scaled for the scaled squares, which do not overflow.
 pub(crate) const SCALE: f64 = 1e-163;
 
-/// Returns the square root of a mean of squares; of the mean of scaled squares if the first one is infinite.
+/// Returns the root of a mean of squares; if `square` overflowed, computes it from the mean of scaled squares.
 pub(crate) fn root(square: f64, scaled_square: f64) -> f64 {
     if square.is_infinite() { scaled_square.sqrt() / SCALE } else { square.sqrt() }
 }
