@@ -7,12 +7,12 @@ const HUGE: f64 = 1e300;
 #[derive(Debug, Clone, Copy)]
 enum Scale {
     Linear,
-    /// Linear up to this magnitude and logarithmic beyond it, on both sides.
+    /// Linear between minus and plus this magnitude, logarithmic beyond.
     Symmetric(f64),
 }
 
 impl Scale {
-    /// Maps a value to a linear scale; for a symmetric scale, the magnitude that starts the decades becomes 1.
+    /// Maps a value to a linear scale. On a symmetric scale, the knee becomes 1, and each further decade adds 1.
     fn to_linear(self, value: f64) -> f64 {
         match self {
             Self::Linear => value,
@@ -68,9 +68,9 @@ impl Axis {
         Self { scale: Scale::Symmetric(knee), ..Self::exact(ends.0, ends.1, pixels, ticks) }
     }
 
-    /// Creates a linear axis with a margin around `values`, whose magnitudes count as `cap` if they are larger. Ignores
-    /// NaN; without values, the axis is around 0 to 1. Values that differ by up to 1e-9 of their magnitude, as
-    /// constants with errors of rounding do, count as one.
+    /// Creates a linear axis with a margin around `values`, clipped to magnitudes up to `cap`. Ignores NaN; without
+    /// values, the axis is around 0 to 1. Values that differ by up to 1e-9 of their magnitude count as equal, because
+    /// they may be a constant with rounding errors.
     pub fn around(
         values: impl Iterator<Item = f64>,
         cap: Option<f64>,
@@ -106,7 +106,7 @@ impl Axis {
         (self.low..=self.high).contains(&value)
     }
 
-    /// Returns the page coordinate of a value; far outside, it is clipped to one axis length outside; NaN for NaN.
+    /// Returns the page coordinate of a value, clipped to at most one axis length beyond the axis; NaN for NaN.
     #[must_use]
     pub fn place(&self, value: f64) -> f64 {
         let [low, high, value] = [self.low, self.high, value].map(|end| self.scale.to_linear(end));
@@ -135,7 +135,7 @@ impl Axis {
         }
     }
 
-    /// Returns the number of decades between two ticks of an axis over `decades`, for about as many ticks as requested.
+    /// Returns the number of decades between two ticks of an axis that spans `decades`.
     fn stride(&self, decades: f64) -> i32 {
         let most = f64::from(self.ticks);
         (1..=300).find(|stride| decades <= most * f64::from(*stride)).unwrap_or(300)

@@ -123,7 +123,7 @@ impl Canvas {
     }
 }
 
-/// Estimates the width of a text generously, because the SVG viewer chooses the font.
+/// Returns a generous estimate of the width of a text, because the SVG viewer chooses the font.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(|_| 0.58 * size).sum()
 }

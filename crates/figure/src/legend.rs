@@ -47,7 +47,7 @@ fn places(entries: &[Entry<'_>], left: f64) -> Vec<Place> {
     entries.iter().map(place).collect()
 }
 
-/// Returns the label; if it is wider than `room`, its first and last letters, which distinguish it best.
+/// Returns the label, shortened to `room` by an ellipsis in the middle: its start and end distinguish it best.
 fn shortened(label: &str, room: f64) -> String {
     let letters: Vec<char> = label.chars().collect();
     let fits = |count: usize| text_width(&"x".repeat(count), TEXT_SIZE) <= room;

@@ -64,8 +64,8 @@ pub struct Panel<'a> {
     pub y_label: &'a str,
     /// Range of the time axis; `None`: all finite times.
     pub x_range: Option<(f64, f64)>,
-    /// Largest magnitude in the automatic range of the vertical axis. Larger values leave the frame, with
-    /// a remark beside the legend.
+    /// Largest magnitude in the automatic range of the vertical axis. Larger values are outside of the frame, which a
+    /// remark beside the legend states.
     pub y_cap: Option<f64>,
     /// The curves; later curves cover earlier ones.
     pub series: Vec<Series<'a>>,
@@ -73,7 +73,7 @@ pub struct Panel<'a> {
     pub marks: Vec<(f64, &'a str)>,
     /// Height of the frame in SVG units; default: 168.
     pub frame_height: Option<f64>,
-    /// A claimed bound of the magnitude and its name in the legend: thin lines at plus and minus the bound.
+    /// A bound of the magnitude, drawn as thin lines at plus and minus the bound, and its name in the legend.
     pub limit: Option<(f64, &'a str)>,
 }
 
@@ -92,7 +92,7 @@ pub struct Series<'a> {
     pub broad: bool,
 }
 
-/// Converts samples to a staircase: each value is constant until the time of the next one, the last one is a point.
+/// Converts samples to a staircase: each value is held until the time of the next one; the last one is a point.
 #[must_use]
 pub fn stairs(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let ends = time.iter().skip(1).chain(time.last());
