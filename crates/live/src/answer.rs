@@ -12,14 +12,14 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; c
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 /// Largest number of bytes of a refused request that are still read, so that the client can read the answer.
 const REST: usize = 256 << 10;
-/// Time for reading these bytes.
+/// Longest time for reading the rest of a refused request.
 const REST_TIME: Duration = Duration::from_millis(500);
 
 pub(crate) struct Answer {
     pub(crate) status: u16,
     pub(crate) kind: &'static str,
     pub(crate) body: Cow<'static, str>,
-    /// The methods that the address allows, if the request has another one.
+    /// The methods that the address allows (header `Allow`), if the request has another method.
     pub(crate) allow: Option<&'static str>,
 }
 
@@ -103,7 +103,7 @@ fn put(stream: &mut TcpStream, mut bytes: &[u8], deadline: Instant) -> io::Resul
     Ok(())
 }
 
-/// Reads the bytes that the client still sends, within limits: closing the connection before would lose the answer.
+/// Reads the bytes that the client still sends, within limits: the answer would be lost if the connection were closed.
 fn drain(stream: &mut TcpStream) {
     let end = Instant::now() + REST_TIME;
     let (mut chunk, mut count) = ([0; 4096], 0);

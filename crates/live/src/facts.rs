@@ -9,8 +9,8 @@ pub enum Subject {
     /// A run: a sample is a communication point.
     #[default]
     Run,
-    /// A campaign: a sample is a run, its time is the number of finished runs, and a message has the
-    /// status of a run in the place of an FMU.
+    /// A campaign: a sample is a finished run, the time of a sample is the number of finished runs, and a message has
+    /// the status of a run in place of the name of an FMU.
     Campaign,
 }
 
@@ -25,7 +25,7 @@ pub struct Facts {
     pub start: f64,
     /// Stop time in s.
     pub stop: f64,
-    /// The factor of real time at which the run is paced, if it is.
+    /// The speed to which the run is paced, as a factor of real time; `None` if it is not paced.
     pub pace: Option<f64>,
     /// The signals, in the order of the values of a [`crate::Sample`].
     pub signals: Vec<Variable>,
@@ -42,13 +42,13 @@ pub struct Facts {
 /// A variable.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Variable {
-    /// Its name, `fmu.variable`.
+    /// The name, `fmu.variable`.
     pub name: String,
-    /// Its unit; empty if it has none.
+    /// The unit; empty if the variable has none.
     pub unit: String,
-    /// Its type, as in the model description: `Real`, `Boolean` and so on.
+    /// The type, as in the model description: `Real`, `Boolean` and so on.
     pub kind: String,
-    /// Its description; empty if it has none.
+    /// The description; empty if the variable has none.
     pub description: String,
 }
 
@@ -57,6 +57,6 @@ pub struct Variable {
 pub struct Source {
     /// The input.
     pub input: Variable,
-    /// The output that is connected to it.
+    /// The output that is connected to the input.
     pub output: String,
 }

@@ -22,7 +22,7 @@ impl Token {
         &self.0
     }
 
-    /// Returns whether `other` equals the token, in a time that does not depend on the position of a difference.
+    /// Returns whether `other` equals the token, in a time that does not depend on where they differ.
     pub(crate) fn is(&self, other: &str) -> bool {
         let (token, other) = (self.0.as_bytes(), other.as_bytes());
         let pairs = token.iter().zip(other);
@@ -62,7 +62,7 @@ impl Guard {
             return Err((403, "the Origin of the request is another site"));
         }
         let site = request.site.as_deref().unwrap_or("none");
-        // A page may be opened by a link, which browsers report as another site.
+        // A link on another site may open the page: browsers report that site.
         let is_navigation = request.method == "GET" && request.mode.as_deref() == Some("navigate");
         if !(["same-origin", "none"].contains(&site) || is_navigation) {
             return Err((403, "the request comes from another site"));

@@ -20,11 +20,11 @@ pub(crate) struct HttpRequest {
     pub(crate) query: String,
     pub(crate) host: Option<String>,
     pub(crate) origin: Option<String>,
-    /// `Sec-Fetch-Site`, which browsers state.
+    /// The header `Sec-Fetch-Site`, which browsers send.
     pub(crate) site: Option<String>,
-    /// `Sec-Fetch-Mode`, which browsers state.
+    /// The header `Sec-Fetch-Mode`, which browsers send.
     pub(crate) mode: Option<String>,
-    /// `Content-Type`.
+    /// The header `Content-Type`.
     pub(crate) kind: Option<String>,
     pub(crate) body: String,
 }
@@ -43,7 +43,7 @@ struct Head {
     body_size: usize,
 }
 
-/// Reads a request until `deadline`. Refuses one that is late, too large or not HTTP/1.1, and a body that is not UTF-8.
+/// Reads a request until `deadline`. Refuses it if it is late, too large or not HTTP/1.1, or its body is not UTF-8.
 pub(crate) fn read(stream: &mut TcpStream, deadline: Instant) -> Result<HttpRequest, Refusal> {
     let mut bytes = Vec::new();
     let Head { mut request, size, body_size } = loop {
@@ -61,7 +61,7 @@ pub(crate) fn read(stream: &mut TcpStream, deadline: Instant) -> Result<HttpRequ
     Ok(request)
 }
 
-/// Appends the bytes that arrive next, if any. Refuses after `deadline`; the error is `None` if the connection ends.
+/// Appends the bytes that arrive next. Returns a refusal after `deadline`, and the error `None` if the connection ends.
 fn receive(stream: &mut TcpStream, deadline: Instant, bytes: &mut Vec<u8>) -> Result<(), Refusal> {
     let late = Some((408, "the request took too long"));
     let left = deadline.saturating_duration_since(Instant::now());

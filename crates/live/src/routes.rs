@@ -15,10 +15,10 @@ use crate::request::HttpRequest;
 use crate::shared::{Phase, Shared};
 use crate::store::{Query, SHOWN};
 
-/// Time to wait for the answer of the run, which may be within a long step.
+/// Longest time to wait for an answer of the run, which may be in the middle of a step.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The content type of requests to the run. Browsers send it to another site only after a preflight request, which this
-/// server refuses.
+/// The content type of requests to the run. A page of another site can send it only after a preflight request of the
+/// browser, which this server refuses.
 const TOML: &str = "application/toml";
 
 const HTML: &str = include_str!("page/page.html");
@@ -85,10 +85,10 @@ impl Site {
     }
 
     fn state(&self, query: &Query) -> Answer {
-        // Calls for a sample at once, so that a page does not wait for the first one.
+        // Requests a sample at once, so that a page shows its first sample without delay.
         self.shared.call_for_sample();
         let dropped = self.shared.dropped.load(Ordering::Relaxed);
-        // Read before the store takes the events, so that a page that sees the end has all of them.
+        // The phase is read before `store` takes the events, so that a page that sees the end has all events.
         let phase = self.shared.phase();
         let state = self.shared.store().state(query, &phase, dropped);
         Answer::json(200, &state)
@@ -123,8 +123,8 @@ impl Site {
     }
 }
 
-/// Parses `rows=N&messages=N&show=N,N`; every part may be missing, and numbers after the first [`SHOWN`] signals are
-/// ignored. Returns `None` for other text.
+/// Parses `rows=N&messages=N&show=N,N`; every part may be missing, and signals after the first [`SHOWN`] are ignored.
+/// Returns `None` for other text.
 fn query(text: &str) -> Option<Query> {
     let mut query = Query::default();
     for part in text.split('&').filter(|part| !part.is_empty()) {

@@ -1,5 +1,5 @@
-//! The threads of the server: one accepts connections, one calls the run for samples, and one for each connection
-//! answers its request.
+//! The threads of the server: one accepts connections, one requests samples from the run, and one per connection
+//! answers the request.
 
 use std::io;
 use std::net::{TcpListener, TcpStream};
@@ -12,11 +12,11 @@ use crate::answer::Answer;
 use crate::request;
 use crate::routes::Site;
 
-/// Largest number of connections at the same time; more are closed at once.
+/// Largest number of simultaneous connections; a further one is closed at once.
 const CONNECTIONS: usize = 24;
 /// Time for receiving a request.
 const REQUEST_TIME: Duration = Duration::from_secs(2);
-/// Time for sending its answer.
+/// Time for sending an answer.
 const ANSWER_TIME: Duration = Duration::from_secs(5);
 /// Pause after a connection that could not be accepted, for example because there are too many open files.
 const REST: Duration = Duration::from_millis(50);
@@ -24,7 +24,7 @@ const REST: Duration = Duration::from_millis(50);
 const SAMPLE: Duration = Duration::from_millis(10);
 /// Interval between two checks whether a page is open.
 const IDLE: Duration = Duration::from_millis(100);
-/// Shortest interval between samples as a multiple of the time that a sample takes.
+/// Shortest interval between samples, as a multiple of the wall-clock time that a sample costs the run.
 const COSTS: u32 = 50;
 
 /// Starts the threads. They end after the view is closed.
@@ -41,7 +41,7 @@ pub(crate) fn start(listener: TcpListener, site: Arc<Site>) -> io::Result<()> {
 fn call_for_samples(site: &Site) {
     let shared = &site.shared;
     while !shared.closed.load(Ordering::Acquire) {
-        // The lock of the store ends with this statement.
+        // The lock of the store is released after this statement.
         let is_watched = shared.store().is_watched();
         if is_watched {
             shared.call_for_sample();

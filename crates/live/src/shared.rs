@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use crate::store::{Event, Store};
 
-/// The flag by which the server calls the run for a sample.
+/// The flag by which the server asks the run for a sample.
 const SAMPLE: u8 = 1;
-/// The flag by which the server calls the run for a request.
+/// The flag by which the server asks the run to answer a request.
 const REQUEST: u8 = 2;
 
 /// The state of the run.

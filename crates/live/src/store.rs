@@ -12,9 +12,9 @@ const MOST_ROWS: usize = 4000;
 const LEAST_ROWS: usize = 100;
 /// Largest number of values in all rows.
 const VALUES: usize = 1_000_000;
-/// Largest number of messages kept, and sent at once.
+/// Largest number of messages that are kept, and that one answer contains.
 const MESSAGES: usize = 1000;
-/// Largest number of signals sent at once.
+/// Largest number of signals in one answer.
 pub(crate) const SHOWN: usize = 32;
 /// A page that has sent no request for longer than this counts as closed.
 const PATIENCE: Duration = Duration::from_secs(3);
@@ -32,7 +32,7 @@ pub struct Sample {
     pub seconds: f64,
     /// Number of steps whose iteration failed; `None` without iteration.
     pub fallbacks: Option<u64>,
-    /// Number of steps that ended after their instant; `None` if the run is not paced.
+    /// Number of steps that ended later than the pacing requires; `None` if the run is not paced.
     pub late: Option<u64>,
 }
 
@@ -78,7 +78,7 @@ pub(crate) struct Query {
     pub(crate) shown: Vec<usize>,
 }
 
-/// The state of a run on the side of the server.
+/// The data of a run that the server keeps.
 #[derive(Default)]
 pub(crate) struct Store {
     signals: usize,
@@ -156,8 +156,8 @@ impl Store {
         self.last_request.is_some_and(|time| time.elapsed() < PATIENCE)
     }
 
-    /// Returns the state of the run with the rows and messages of `query`; values that are not finite, and those of
-    /// signals that do not exist, are null.
+    /// Returns the state of the run as JSON, with the rows and messages of `query`. Values that are not finite, and
+    /// values of unknown signals, are null.
     pub(crate) fn state(&mut self, query: &Query, phase: &impl Serialize, dropped: u64) -> Value {
         self.outcome_shown |= self.outcome.is_some();
         let rows: Vec<&Row> =

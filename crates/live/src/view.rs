@@ -80,15 +80,15 @@ impl View {
         &self.address
     }
 
-    /// Returns whether the server calls for a sample or for the answer to a request.
+    /// Returns whether the server asks for a sample or for the answer to a request.
     #[inline]
     #[must_use]
     pub fn is_called(&self) -> bool {
         self.shared.is_called()
     }
 
-    /// Ends the call, so that [`View::is_called`] returns false until the next one; returns whether a sample is
-    /// due. The requests are then available by [`View::request`].
+    /// Makes [`View::is_called`] return false until the server asks again; returns whether a sample is due. The
+    /// requests are then available by [`View::request`].
     #[must_use]
     pub fn take_calls(&self) -> bool {
         self.shared.take_calls()
@@ -121,8 +121,8 @@ impl View {
         self.messages.publish(Event::Sample(sample));
     }
 
-    /// Sets the time that the last sample took. The server then calls for samples so rarely that samples of
-    /// up to a second take at most 2 % of the time, apart from the samples that a page requests.
+    /// Sets the wall-clock time that the last sample took. The server then asks for samples so rarely that samples of
+    /// up to a second take at most 2 % of the time, not counting samples that a page requests.
     pub fn set_cost(&self, cost: Duration) {
         self.shared.set_sample_duration(cost);
     }
@@ -180,7 +180,7 @@ mod tests {
         let view = View::open(&Facts::default(), Phase::Running).unwrap();
         view.set_cost(Duration::from_secs(1));
         view.shared.store().record_request();
-        // After its first check, the server sleeps for 50 s.
+        // After the first check, the server sleeps for 50 s: 50 times the cost of a sample.
         std::thread::sleep(Duration::from_millis(300));
         let messages = view.messages();
         (0..=EVENTS).for_each(|_| messages.send("", String::new()));
