@@ -34,7 +34,7 @@ pub struct Element {
     pub fmu: PathBuf,
     /// Name of the FMU for messages if `fmu` is an unpacked copy: `system.ssp/resources/m.fmu`.
     pub shown: Option<PathBuf>,
-    /// The archive from which `fmu` was unpacked; ignored if `fmu` is another path than its folder.
+    /// The archive from which `fmu` was unpacked; ignored unless `fmu` is [`Origin::folder`].
     pub origin: Option<Origin>,
     /// Values set before the initialization, in this order; later values override earlier ones.
     pub settings: Vec<Setting>,
@@ -57,12 +57,13 @@ impl Element {
     }
 }
 
-/// An archive, and the folder with the files that were unpacked from it: all that a simulation on this platform needs.
+/// An archive, and the folder with the files unpacked from it, which are those that a simulation on this platform
+/// needs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Origin {
     /// Path of the archive.
     pub archive: PathBuf,
-    /// Path of the folder.
+    /// Path of the folder with the unpacked files.
     pub folder: PathBuf,
 }
 
@@ -86,7 +87,7 @@ pub struct Setting {
 /// One end of a link.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Terminal {
-    /// [`Element::name`].
+    /// The name of the element, [`Element::name`].
     pub element: String,
     /// Name of the variable in the FMU.
     pub variable: String,
@@ -107,7 +108,7 @@ pub struct Link {
     pub to: Terminal,
     /// The transformation of the value.
     pub transformation: Transformation,
-    /// Whether unit conversion is complete: `transformation` includes it, or it is suppressed. If
-    /// false, the value is converted between the units of the two variables.
+    /// Whether `transformation` includes the unit conversion, or the conversion is suppressed. If false, the value is
+    /// also converted between the units of the two variables.
     pub units_settled: bool,
 }

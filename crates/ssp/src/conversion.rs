@@ -6,24 +6,24 @@ use fmu_description::{Kind, ModelDescription, ScalarVariable, SimpleType};
 use super::structure::{Conversion, Definitions, Transformation as Stated, Type};
 use slave::Transformation;
 
-/// Two units of the same name count as equal if the factor of their conversion differs from 1, and its offset
-/// from 0, by less than this: one of the files states fewer digits.
+/// Two units of the same name count as equal if the factor of their conversion differs from 1, and its offset from 0,
+/// by less than this, since files state units with different numbers of digits.
 const SAME_FACTOR: f64 = 1e-6;
 
 /// The unit or enumeration of the values at a connector.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Measure {
-    /// The unit: its name and its definition.
+    /// Name and definition of the unit.
     pub(super) unit: Option<(String, Option<BaseUnit>)>,
-    /// Whether the values are differences (`relativeQuantity`), which have no offset; `None` if no FMU says so.
+    /// Whether the values are differences (`relativeQuantity`), which have no offset; `None` if no FMU states this.
     pub(super) relative: Option<bool>,
     /// Items of the enumeration.
     pub(super) items: Option<Vec<(String, i32)>>,
 }
 
 impl Measure {
-    /// Creates the measure of a stated type; its unit or enumeration is defined by the first of `scopes` that has its
-    /// name. Empty for types without unit and enumeration.
+    /// Creates the measure of a stated type, empty for a type without unit and enumeration. The first of `scopes` that
+    /// has the name of the unit or enumeration defines it.
     pub(super) fn stated(kind: Option<&Type>, scopes: &[&Definitions]) -> Self {
         match kind {
             Some(Type::Real(Some(unit))) => Measure::unit(unit, scopes),
@@ -32,14 +32,14 @@ impl Measure {
         }
     }
 
-    /// Creates the measure of a unit, defined by the first of `scopes` that has its name.
+    /// Creates the measure of the unit `name`, which the first of `scopes` with this name defines.
     pub(super) fn unit(name: &str, scopes: &[&Definitions]) -> Self {
         let mut all = scopes.iter().flat_map(|scope| &scope.units);
         let base = all.find(|unit| unit.name == name).map(|unit| unit.base);
         Measure { unit: Some((name.to_owned(), base)), ..Measure::default() }
     }
 
-    /// Creates the measure of an enumeration, defined by the first of `scopes` that has its name.
+    /// Creates the measure of the enumeration `name`, which the first of `scopes` with this name defines.
     pub(super) fn enumeration(name: &str, scopes: &[&Definitions]) -> Self {
         let mut all = scopes.iter().flat_map(|scope| &scope.enumerations);
         let items = all.find(|known| known.name == name).map(|known| known.items.clone());
@@ -68,7 +68,7 @@ impl Measure {
         }
     }
 
-    /// Fills missing fields from `other`.
+    /// Replaces missing fields by those of `other`.
     pub(super) fn or(self, other: Measure) -> Self {
         Measure {
             unit: self.unit.or(other.unit),
@@ -85,10 +85,10 @@ impl Measure {
 /// Returns factor and offset that convert values from the unit of `from` to the unit of `to`; both
 /// units satisfy `base = factor * unit + offset`, without the offset for differences.
 ///
-/// The result is (1, 0) if one side has no unit. For units of the same name it is (1, 0), too, unless both
-/// are defined, measure the same quantity and differ in factor or offset. For units of different names it is
-/// `None` if a definition is missing, and an error sentence if they measure different quantities, or if they differ by
-/// an offset and only one side is a difference.
+/// The result is (1, 0) if one side has no unit. For units of the same name it is (1, 0), too, unless both are defined,
+/// measure the same quantity and differ in factor or offset. For units of different names it is `None` if a definition
+/// is missing, and an error sentence if the units measure different quantities, or differ by an offset while only one
+/// side is a difference.
 pub(super) fn between(from: &Measure, to: &Measure) -> Result<Option<(f64, f64)>, String> {
     const SAME: (f64, f64) = (1.0, 0.0);
     let (Some((from_name, from_base)), Some((to_name, to_base))) = (&from.unit, &to.unit) else {
@@ -135,9 +135,9 @@ impl ConversionChain {
         ConversionChain { measure, ..ConversionChain::default() }
     }
 
-    /// Appends a connection to a connector with the measure `there`: first the unit conversion, unless
-    /// it is suppressed, then the transformation. Returns an error sentence if the units cannot be
-    /// converted, if an enumeration lacks an item, or if transformations of different types follow each other.
+    /// Appends a connection that ends at a connector with the measure `there`: the unit conversion, unless suppressed,
+    /// then the transformation. Returns an error sentence if the units cannot be converted, if an enumeration lacks an
+    /// item, or if transformations of different types follow each other.
     pub(super) fn append(
         self,
         conversion: &Conversion,
@@ -162,10 +162,10 @@ impl ConversionChain {
             transformation = then(transformation, stated)?;
         }
         let Measure { unit, relative, items } = self.measure;
-        // After a suppressed conversion, the values are not in the unit of the source, and may be no differences.
+        // If the conversion is suppressed, the unit of the values, and whether they are differences, is unknown.
         let (unit, relative) =
             if conversion.suppress_units { (None, None) } else { (unit, relative) };
-        // A difference from an operating point becomes a value.
+        // An offset turns a difference from an operating point into an absolute value.
         let is_moved = matches!(stated, Some(Stated::Linear { offset, .. }) if *offset != 0.0);
         let relative = relative.filter(|_| !is_moved);
         let items = if stated.is_some() { None } else { items };
@@ -252,13 +252,13 @@ pub(super) fn then(
     })
 }
 
-/// Returns the target of `value`; `value` itself if it has none.
+/// Returns the target of `value` in `pairs`; `value` itself if no pair has it.
 fn mapped(pairs: &[(i32, i32)], value: i32) -> i32 {
     pairs.iter().find(|(source, _)| *source == value).map_or(value, |(_, target)| *target)
 }
 
-/// Returns a warning if the file and the FMU state different units for a connector, or units of different names
-/// of which one is not defined.
+/// Returns a warning if the file and the FMU state different units for a connector, or units of different names of
+/// which one has no definition.
 pub(super) fn contradiction(stated: &Measure, declared: &Measure) -> Option<String> {
     match between(stated, declared) {
         Ok(Some((factor, offset))) if (factor, offset) == (1.0, 0.0) => None,

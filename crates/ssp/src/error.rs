@@ -39,7 +39,7 @@ pub enum SspError {
     Limit {
         limit: usize,
         what: &'static str,
-        /// [`fmu_description::limits::HELP`] if the limit can be lifted, otherwise empty.
+        /// [`fmu_description::limits::HELP`] if the user can lift the limit, otherwise empty.
         help: &'static str,
     },
     /// A file, element or variable is missing or unsuitable.

@@ -11,7 +11,7 @@ use super::tree::{Content, Tree, Vertex};
 use crate::assembly::{Link, Terminal};
 use slave::Transformation;
 
-/// The graph of all connections, directed from source to target and indexed by target.
+/// The graph of all connections, directed from source to target; each target has at most one.
 pub(super) struct Flow {
     pub(super) edges: Vec<Edge>,
     inbound: HashMap<Vertex, usize>,
@@ -30,7 +30,7 @@ pub(super) struct Edge {
 
 impl Edge {
     /// Appends the conversion of this connection. If an end is a component whose source is another system structure,
-    /// also converts between the units that both state for the connector.
+    /// also converts between the unit that the component states for the connector and the unit inside that structure.
     fn convert(&self, tree: &Tree, chain: ConversionChain) -> Result<ConversionChain, String> {
         let outside = |vertex: &Vertex| {
             let stated = (self.system != vertex.node).then(|| tree.measure_outside(vertex));
@@ -79,8 +79,8 @@ impl Side {
         }
     }
 
-    /// Returns when values at the connector may change: 0 never, 1 before the run, 2 during it. An unspecified
-    /// connector counts as 0 as a source and as 2 as a target, so that it can be connected to every kind.
+    /// Returns when values at the connector may change: 0 never, 1 before the run, 2 during the run. A connector of
+    /// unspecified kind counts as 0 as a source and as 2 as a target, so that it can be connected to every kind.
     fn rate(&self, as_source: bool) -> u32 {
         use ConnectorKind::{
             CalculatedParameter, Constant, Parameter, StructuralParameter, Unspecified,
@@ -108,8 +108,8 @@ impl Side {
 }
 
 impl Flow {
-    /// Determines the direction of every connection and builds the graph. Returns an error if the ends of a connection
-    /// do not exist or do not fit, or if a connector has two sources; warns about ends that contradict their FMU.
+    /// Determines the direction of every connection and builds the graph. Returns an error if an end of a connection
+    /// does not exist, the ends do not fit, or a connector has two sources; warns about ends that contradict their FMU.
     pub(super) fn new(tree: &Tree, warnings: &mut Vec<String>) -> Result<Self, SspError> {
         let mut flow = Flow { edges: Vec::new(), inbound: HashMap::new() };
         for (system, node) in tree.nodes.iter().enumerate() {
@@ -159,8 +159,8 @@ impl Flow {
         Ok(())
     }
 
-    /// Returns the path of edges to `target`, from an FMU or a connector without inbound connection; empty if
-    /// `target` has none. A ring of connections without an FMU is an error.
+    /// Returns the edges on the path to `target` from the nearest FMU or, without one, from the first connector; empty
+    /// if no connection ends at `target`. A ring of connections without an FMU is an error.
     pub(super) fn upstream(&self, tree: &Tree, target: &Vertex) -> Result<Vec<&Edge>, SspError> {
         let mut path = Vec::new();
         let mut vertex = target;
@@ -196,9 +196,9 @@ impl Flow {
         Ok(chain)
     }
 
-    /// Returns the links between FMUs, in the order of the connections that end at an FMU. Warns about
-    /// inputs whose source nothing drives, unless `is_set` returns true for them, and about units that are not
-    /// converted. Returns an error for a ring of connections or a conversion that is not possible.
+    /// Returns the links between FMUs, in the order of the connections that end at an FMU. Warns about units that are
+    /// not converted, and about an input that no FMU drives unless `is_set` returns true for it. Returns an error for a
+    /// ring of connections or a conversion that is not possible.
     pub(super) fn links(
         &self,
         tree: &Tree,
@@ -236,7 +236,7 @@ impl Flow {
     }
 }
 
-/// Returns an error about a position in the file of a system.
+/// Returns an error at a position in the file of a system.
 fn at(tree: &Tree, system: usize, at: Position, sentence: impl Into<String>) -> SspError {
     semantic_error(at, sentence).in_file(&tree.nodes[system].file.shown)
 }
@@ -264,7 +264,7 @@ fn check(tree: &Tree, edge: &Edge, transformation: &Transformation) -> Result<()
     Err(at(tree, edge.system, edge.at, sentence))
 }
 
-/// Resolves an end of a connection in `system`; warns if it contradicts its FMU. Returns an error sentence if the
+/// Resolves an end of a connection in `system`; warns if the end contradicts its FMU. Returns an error sentence if the
 /// element, the connector or the variable does not exist or cannot be connected.
 fn side(tree: &Tree, system: usize, end: &End, warnings: &mut Vec<String>) -> Result<Side, String> {
     let node = match &end.element {

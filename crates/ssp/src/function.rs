@@ -163,7 +163,7 @@ impl FunctionSlave {
     /// Returns the component `component` of the output at the communication point reached.
     fn sum(&self, component: usize) -> f64 {
         let inputs = self.inputs.iter().skip(component).step_by(self.dimension);
-        // The sum of one value is this value, -0 included.
+        // Without an initial 0, the sum of the single value -0 is -0.
         inputs.map(|input| input.value).reduce(|sum, value| sum + value).unwrap_or_default()
     }
 

@@ -43,8 +43,8 @@ use tree::{Content, Tree, Vertex};
 /// A loaded system structure with its unpacked FMUs.
 #[derive(Debug)]
 pub struct Opened {
-    /// The FMUs, their settings and their connections. The paths of the FMUs are folders with unpacked
-    /// FMUs; they, and the archives in an SSP from which they were unpacked, exist as long as [`Opened::folders`].
+    /// The FMUs, their settings and their connections. The paths of the FMUs are folders with unpacked FMUs. These
+    /// folders, and the unpacked archives of an SSP, exist as long as [`Opened::folders`].
     pub assembly: Assembly,
     /// Start time, stop time and base step that the file states. The base step of an OSP file without one is 0.1 s.
     pub experiment: DefaultExperiment,
@@ -90,12 +90,12 @@ pub fn open(path: &Path) -> Result<Opened, SspError> {
     open_variant(path, None)
 }
 
-/// Loads an SSP archive or a folder like [`open`], but uses its SSD called `variant`; `None` selects
+/// Same as [`open`] for an SSP archive or a folder, but loads the SSD called `variant` from it; `None` selects
 /// `SystemStructure.ssd`. If `path` is an SSD file, `variant` is ignored. OSP files are not supported.
 ///
 /// # Errors
 ///
-/// Same as [`open`], also if there is no such SSD.
+/// Same as [`open`]; also if there is no SSD called `variant`.
 pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspError> {
     let (mut tree, document) = load::load(path, variant)?;
     let mut warnings = std::mem::take(&mut tree.warnings);
@@ -133,7 +133,7 @@ pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspErr
         start_time: experiment.start_time,
         stop_time: experiment.stop_time,
     };
-    // Files of this program state the step as libcosim does, but request no algorithm.
+    // This program writes the step as libcosim's annotation, without a request for an algorithm.
     let is_own = document.structure.generation_tool.as_deref() == Some(write::TOOL);
     let fixed_step = experiment.step_size.is_some() && !is_own;
     let folders = Folders { _fmus: tree.fmus, _packages: tree.folders };
@@ -167,7 +167,7 @@ fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
                 .extend(contradiction(&stated, &declared).map(|text| format!("{name}: {text}")));
             let stated = connector.kind_of_value.as_ref().and_then(element);
             let declared = variable.kind.element();
-            // Numbers of every width are one type of SSP here.
+            // Numbers of every width count as one type, as in `Type`.
             let of_ssp = match &variable.kind {
                 Kind::Float32(_) => "Real",
                 Kind::Enumeration(_) => "Enumeration",

@@ -47,7 +47,7 @@ pub(super) fn load(path: &Path, variant: Option<&str>) -> Result<(Tree, Rc<Docum
     loader.system(&document.structure.system, &document, place)?;
     let Loader { tree, files: Files { fmus, shown, folders, warnings, .. }, .. } = loader;
     let variables = fmus.iter().map(|fmu| {
-        // Of several variables with the same name, the first one counts.
+        // Reversed, so that the first of several variables with the same name remains in the map.
         let all = fmu.description.variables.iter().enumerate().rev();
         all.map(|(position, variable)| (variable.name.clone(), position)).collect()
     });
@@ -248,8 +248,8 @@ impl Loader {
         Ok(node)
     }
 
-    /// Adds a reference to a signal dictionary: searches the dictionary in the parent system, then further out. Returns
-    /// an error if there is none.
+    /// Adds a reference to a signal dictionary, which is searched in the parent system, then in the systems around it.
+    /// Returns an error if it is not found.
     fn reference(
         &mut self,
         reference: &DictionaryReference,
@@ -273,8 +273,8 @@ impl Loader {
         Ok(node)
     }
 
-    /// Loads the files of the bindings. `component` is the base of URIs relative to the component; without
-    /// it, a binding with such a URI is an error.
+    /// Loads the files of the bindings. `component` is the base of URIs relative to the component; if it is `None`, a
+    /// binding with such a URI is an error.
     fn bindings(
         &mut self,
         bindings: &[ParameterBinding],
@@ -317,14 +317,14 @@ fn check_library(fmu: &Unpacked) -> Result<(), String> {
     fmu.library(identifier).map(|_| ()).map_err(|error| error.to_string())
 }
 
-/// Returns the name of the library: that of co-simulation, otherwise that of model exchange, if the FMU has either.
+/// Returns the name of the library for co-simulation, otherwise for model exchange; `None` if the FMU has neither.
 fn identifier(fmu: &Unpacked) -> Option<&str> {
     let (simulation, exchange) = (&fmu.description.co_simulation, &fmu.description.model_exchange);
     let exchange = || exchange.as_ref().map(|flags| flags.model_identifier.as_str());
     simulation.as_ref().map(|flags| flags.model_identifier.as_str()).or_else(exchange)
 }
 
-/// Returns the first system with the identifier `id`, `system` or one at any depth in it, if there is one.
+/// Returns the first system with the identifier `id`, which is `system` or nested in it at any depth, if there is one.
 fn with_id<'a>(system: &'a System, id: &str) -> Option<&'a System> {
     if system.base.id.as_deref() == Some(id) {
         return Some(system);

@@ -20,12 +20,12 @@ use document::{Connection, Document, End, Kind, Simulator};
 use groups::Group;
 use slave::Transformation;
 
-/// File name in a folder.
+/// Name of the file in a folder.
 const DEFAULT: &str = "OspSystemStructure.xml";
 /// The resolution of time in libcosim in s; steps are multiples of it.
 const TICK: f64 = 1e-9;
 
-/// Returns whether `path` is a folder with this file and without an SSD.
+/// Returns whether `path` is a folder with an `OspSystemStructure.xml` and without an SSD.
 pub(super) fn is_osp_folder(path: &Path) -> bool {
     path.join(DEFAULT).is_file() && !path.join("SystemStructure.ssd").is_file()
 }
@@ -48,7 +48,7 @@ pub(super) fn open(path: &Path) -> Result<Opened, SspError> {
     Ok(Opened { assembly, experiment, steps, fixed_step: true, warnings, folders })
 }
 
-/// A file during its conversion to an assembly.
+/// The state of the conversion of a file to an assembly.
 #[derive(Default)]
 struct Loader {
     base: Base,
@@ -135,8 +135,8 @@ impl Loader {
         Ok(())
     }
 
-    /// Adds the step of a simulator that states one. As in libcosim it is the largest multiple of the base
-    /// step that does not exceed the stated step, at least one base step; another step than stated gives a warning.
+    /// Adds the step of a simulator that states one. As in libcosim, it is rounded down to a multiple of the base step,
+    /// but is at least one base step; a rounded step gives a warning.
     fn step(&mut self, simulator: &Simulator, base: f64, at: Position) {
         let Some(stated) = simulator.step_size.filter(|stated| *stated > 0.0) else { return };
         let ticks = |time: f64| (time / TICK.min(base)).round();
@@ -153,8 +153,8 @@ impl Loader {
         self.steps.push((simulator.name.clone(), step));
     }
 
-    /// Returns the variable groups of an FMU, from a file beside the FMU or else beside the system
-    /// structure; none if there is no such file.
+    /// Returns the variable groups of an FMU, from a file beside the FMU, otherwise beside the system structure; none
+    /// if neither exists.
     fn groups(&mut self, fmu: &Target, model: &str) -> Result<Vec<Group>, SspError> {
         let name = format!("{model}_OspModelDescription.xml");
         let beside = [self.base.of_file(fmu), self.base.clone()];
@@ -194,7 +194,7 @@ impl Loader {
         })
     }
 
-    /// Pairs the components of a group of signals, `in[0]` or `out`, with the variables of a group, not of nested ones.
+    /// Pairs the components of a group of signals, `in[0]` or `out`, with the direct variables of a variable group.
     fn signals(&self, signals: &End, variables: &End) -> Result<Vec<[End; 2]>, String> {
         let group = self.group(variables)?;
         let components = (0..group.variables.len()).map(|k| {
@@ -213,9 +213,9 @@ impl Loader {
         self.simulator_entry(simulator).map(|(index, _)| &self.files.fmus[*index].description)
     }
 
-    /// Connects two variables, or a variable and a signal, from output to input. An error sentence if an end does not
-    /// exist or is neither output nor input, both are outputs or both inputs, or the input of a linear transformation
-    /// already has a source.
+    /// Connects two variables, or a variable and a signal, from output to input. Returns an error sentence if an end
+    /// does not exist or is neither output nor input, if both are outputs or both are inputs, or if the input of a
+    /// linear transformation already has a source.
     fn join(&mut self, first: &End, second: &End) -> Result<(), String> {
         let (source, target) = match (self.is_source(first)?, self.is_source(second)?) {
             (true, false) => (first, second),
@@ -320,7 +320,7 @@ impl Loader {
 }
 
 impl End {
-    /// Returns another variable or signal of the same owner.
+    /// Returns the variable or signal `name` of the same owner.
     fn named(&self, name: &str) -> End {
         End { name: name.to_owned(), ..self.clone() }
     }

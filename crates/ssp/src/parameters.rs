@@ -1,5 +1,4 @@
-//! Applies parameter bindings: converts them to settings of FMUs (SSP 1.0.1, sections 5.2.3, 6 and
-//! 7).
+//! Converts parameter bindings to settings of FMUs (SSP 1.0.1, sections 5.2.3, 6 and 7).
 
 mod value;
 
@@ -39,7 +38,7 @@ pub(super) fn settings(
         positions: HashMap::new(),
         warnings,
     };
-    // The tree lists a system before its content; the sort is stable.
+    // Nodes by decreasing depth; nodes of the same depth keep the order of the tree.
     let mut order: Vec<usize> = (0..tree.nodes.len()).collect();
     order.sort_by_cached_key(|node| std::cmp::Reverse(depth(tree, *node)));
     for node in order {
@@ -54,11 +53,11 @@ fn depth(tree: &Tree, node: usize) -> usize {
     std::iter::successors(Some(node), |node| tree.nodes[*node].parent).count()
 }
 
-/// The state of the application of bindings.
+/// Applies the bindings one after the other.
 struct Binder<'a> {
     tree: &'a Tree,
     flow: &'a Flow,
-    /// The targets of all edges, by source.
+    /// The targets of all connections, by source.
     targets: HashMap<&'a Vertex, Vec<&'a Vertex>>,
     settings: Settings,
     /// Positions of the settings in the lists of their nodes.
@@ -126,7 +125,7 @@ impl Binder<'_> {
         }
     }
 
-    /// Warns about `names` that `owner`, an element or the parameter set itself ("it"), lacks.
+    /// Warns about `names` that do not exist in `owner`: the name of an element, or "it" for the parameter set itself.
     fn warn_unmatched(&mut self, values: &ParameterSet, owner: &str, names: &[String]) {
         let (names, nameless): (Vec<&str>, Vec<&str>) =
             names.iter().map(String::as_str).partition(|name| !name.is_empty());
@@ -145,8 +144,8 @@ impl Binder<'_> {
         self.warnings.push(format!("parameter set {set:?}: {owner} has no {names}{more}: ignored"));
     }
 
-    /// Applies one parameter to every variable and connector with the target name of `entry`; adds the name to
-    /// `unmatched` if there is none.
+    /// Applies one parameter to every variable and connector with the target name of `entry`; if there is none, adds
+    /// the name to `unmatched`.
     fn apply(
         &mut self,
         node: usize,
@@ -213,7 +212,7 @@ impl Binder<'_> {
         ends.sort_unstable();
         for end in ends {
             let path = self.flow.upstream(self.tree, &end).map_err(|error| error.to_string())?;
-            // The source may be upstream of the connector that is set.
+            // Only the part of the path behind the connector that is set.
             let start = path.iter().position(|edge| edge.from == *target).unwrap_or(0);
             let measure = self.tree.measure(target).or(value.measure.clone());
             let chain = Flow::convert_along(self.tree, &path[start..], measure);
@@ -224,8 +223,8 @@ impl Binder<'_> {
         Ok(())
     }
 
-    /// Sets the start value of the output that drives the connector, so that the connector gets
-    /// `value`. Does nothing if no FMU drives the connector.
+    /// Sets the start value of the output that drives the connector `target` so that `target` gets `value`. Does
+    /// nothing if no FMU drives it.
     fn set_upstream(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
         let path = self.flow.upstream(self.tree, target).map_err(|error| error.to_string())?;
         let is_fmu =
@@ -270,7 +269,7 @@ impl Binder<'_> {
 }
 
 /// Adds all variables and connectors below `node` with the hierarchical name `name` to `vertices`. There may be
-/// several of them, because names of elements may contain dots.
+/// several, because names of elements may contain dots.
 fn find(tree: &Tree, node: usize, name: &str, vertices: &mut Vec<Vertex>) {
     let element = &tree.nodes[node];
     match element.content {

@@ -142,7 +142,7 @@ fn parameter_value(node: &Node) -> Result<Option<ParameterValue>, SspError> {
     }))
 }
 
-/// Reads an array of SSP 2.0: several values in one attribute, or texts in elements `Value`; `None` for a single one.
+/// Reads an array of SSP 2.0: several values in one attribute, or texts in elements `Value`; `None` for a single value.
 fn array(node: &Node) -> Result<Option<Vec<String>>, SspError> {
     if matches!(node.name.as_str(), "String" | "Enumeration" | "Binary") {
         let values = node.children_named("Value").map(|value| value.required("value"));

@@ -1,5 +1,4 @@
-//! The elements and attributes that the XSDs of SSP 1.0 and 2.0 allow; other content gives
-//! warnings.
+//! The elements and attributes that the XSDs of SSP 1.0 and 2.0 allow; any other gives a warning.
 
 use std::collections::BTreeMap;
 
@@ -49,7 +48,7 @@ pub(super) fn check(node: &Node, warnings: &mut Vec<String>) {
     }
 }
 
-/// Warnings with the position of the first case and the number of cases.
+/// Warnings, each with the position of its first case and the number of cases.
 type Findings = BTreeMap<String, (Position, usize)>;
 
 fn visit(node: &Node, findings: &mut Findings) {

@@ -10,7 +10,7 @@ use percent_encoding::percent_decode_str;
 pub(super) struct Base {
     /// The folder at which relative URIs start.
     pub(super) folder: PathBuf,
-    /// The folder for messages: `plant.ssp/resources` instead of a temporary folder.
+    /// Name of the folder for messages, such as `plant.ssp/resources` for a temporary folder.
     pub(super) shown: PathBuf,
     /// The folder of the unpacked archive that contains the file; URIs must not leave it.
     pub(super) archive: Option<PathBuf>,
@@ -37,7 +37,7 @@ impl Target {
 }
 
 impl Base {
-    /// Returns the base of the files at the root of the unpacked archive `folder`, shown as `shown`.
+    /// Returns the base of files at the root of an archive that is unpacked in `folder`; messages name it `shown`.
     pub(super) fn archive(folder: &Path, shown: &Path) -> Self {
         let (folder, shown) = (folder.to_owned(), shown.to_owned());
         Base { archive: Some(folder.clone()), folder, shown }
@@ -55,8 +55,8 @@ impl Base {
 
     /// Returns the file that `uri` refers to, or an error sentence.
     ///
-    /// libcosim and Ecos run `proxyfmu://HOST?file=URI` in another process or on another machine.
-    /// Here the result is the file itself, with a warning.
+    /// For `proxyfmu://HOST?file=URI`, which libcosim and Ecos run in another process or on another machine, this is
+    /// the file itself, with a warning.
     pub(super) fn resolve(&self, uri: &str) -> Result<Target, String> {
         // A proxy URI must not contain another one.
         if let Some(file) = proxied(uri).filter(|file| proxied(file).is_none()) {

@@ -143,11 +143,11 @@ pub struct Component {
 pub struct DictionaryReference {
     /// Name, connectors and parameter bindings.
     pub base: ElementBase,
-    /// `dictionary`: name of a dictionary of the parent system or of one further out.
+    /// `dictionary`: name of a dictionary of the parent system or of a system around it.
     pub dictionary: String,
 }
 
-/// `SignalDictionary` of a system: its name and its content.
+/// `SignalDictionary` of a system: a name and a content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DictionarySource {
     pub name: String,
@@ -279,7 +279,7 @@ pub struct Parameter {
 /// `ParameterMapping`, the root element of an SSM file (section 7).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterMapping {
-    /// `MappingEntry`s.
+    /// The `MappingEntry` elements.
     pub entries: Vec<MappingEntry>,
 }
 

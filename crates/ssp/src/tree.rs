@@ -30,7 +30,7 @@ pub(super) struct Tree {
     pub(super) warnings: Vec<String>,
 }
 
-/// A system, a component, a signal dictionary, or a reference to one.
+/// A system, a component, a signal dictionary, or a reference to a signal dictionary.
 #[derive(Debug, Default)]
 pub(super) struct Node {
     /// Hierarchical name without the root system, joined by dots; empty for the root.
@@ -72,7 +72,7 @@ pub(super) enum Content {
     Reference(usize),
 }
 
-/// A file: the data that other files need.
+/// The data of a file that its elements and other files need.
 #[derive(Debug, Default)]
 pub(super) struct File {
     /// Name of the file for messages.
@@ -151,8 +151,7 @@ impl Tree {
         node.connector_positions.get(name).map(|&position| &node.connectors[position])
     }
 
-    /// Returns the unit or enumeration of a connector twice: as the file states it, and as the FMU states
-    /// it.
+    /// Returns two measures of a connector: the one that the file states, and the one that the FMU states.
     pub(super) fn measures(&self, vertex: &Vertex) -> (Measure, Measure) {
         let node = &self.nodes[vertex.node];
         let connector = self.connector(vertex.node, &vertex.connector);
@@ -163,15 +162,14 @@ impl Tree {
         (stated, declared.unwrap_or_default())
     }
 
-    /// Returns the unit or enumeration of a connector: as the file states it, otherwise as the FMU
-    /// states it.
+    /// Returns the unit or enumeration that the file states for a connector; what it omits is taken from the FMU.
     pub(super) fn measure(&self, vertex: &Vertex) -> Measure {
         let (stated, declared) = self.measures(vertex);
         stated.or(declared)
     }
 
-    /// Returns the unit or enumeration that the component which refers to this system states for the
-    /// connector; `None` if no component refers to the system or if it does not have the connector.
+    /// Returns the unit or enumeration that the component outside, whose source is this system, states for the
+    /// connector; `None` if there is no such component or if it does not have the connector.
     pub(super) fn measure_outside(&self, vertex: &Vertex) -> Option<Measure> {
         let (connectors, file) = self.nodes[vertex.node].outside.as_ref()?;
         let connector = connectors.iter().find(|connector| connector.name == vertex.connector)?;

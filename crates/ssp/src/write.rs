@@ -29,12 +29,11 @@ pub(super) const TOOL: &str = "aso-ftc";
 
 /// Writes `assembly` as the SSP archive `target`; creates the folder of `target`.
 ///
-/// The FMUs go into `resources`, each with all its files: an archive as it is, also that of an FMU that
-/// [`crate::open`] has unpacked, and a folder packed. The settings of each element go into a parameter set `settings` in
-/// a separate file, bound to the component. Connectors are the connected variables and the
-/// outputs of type Real, Integer and Boolean, with the types and units of the FMUs; those of arrays have their
-/// dimensions (SSP 2.0). `step_size` in s goes into the annotation that libcosim reads. Equal assemblies and FMUs give
-/// equal bytes.
+/// The FMUs go into `resources`, each with all its files. An archive is copied, also the one from which [`crate::open`]
+/// has unpacked an FMU; any other folder is packed. The settings of each element go into a parameter set `settings` in
+/// a separate file, bound to the component. Connectors are the connected variables and the outputs of type Real,
+/// Integer and Boolean, with the types and units of the FMUs; connectors of arrays have dimensions (SSP 2.0).
+/// `step_size` in s goes into the annotation that libcosim reads. Equal assemblies and FMUs give equal bytes.
 ///
 /// # Errors
 ///
@@ -139,10 +138,10 @@ impl Exporter {
         Ok(connectors)
     }
 
-    /// Returns the type of a variable and adds its unit or enumeration to the definitions. Of an array, only the
-    /// dimensions are stated: importers take type and unit from the FMU. A unit is left out if the FMU gives only its
-    /// name, or if another FMU defines it differently. `None` if SSP 1.0 does not have the type, or if the enumeration
-    /// is unknown or another FMU defines it differently.
+    /// Returns the type of a variable and adds its unit or enumeration to the definitions. For an array, states only
+    /// the dimensions: importers take type and unit from the FMU. Leaves out a unit that the FMU does not define, or
+    /// that another FMU defines differently. Returns `None` for a type that SSP 1.0 does not have, and for an
+    /// enumeration that is unknown or that another FMU defines differently.
     fn value_type(
         &mut self,
         variable: &ScalarVariable,
@@ -151,7 +150,8 @@ impl Exporter {
         if !variable.dimensions.is_empty() {
             let size = |extent: &Extent| match extent {
                 Extent::Fixed(size) => Dimension::Size(*size),
-                // The structural parameter has no connector, and a setting may change it.
+                // The size is a structural parameter: it has no connector to refer to, and a setting may change its
+                // value.
                 Extent::Variable(_) => Dimension::Open,
             };
             return Some(Type::Array(variable.dimensions.iter().map(size).collect()));
@@ -259,8 +259,8 @@ impl Exporter {
     }
 }
 
-/// Converts a setting to a value of the type of its variable. Returns an error if the variable does not exist, or if
-/// its type is not one of SSP 1.0 or does not have the value.
+/// Converts a setting to a value of the type of its variable. Returns an error if the variable does not exist, if SSP
+/// 1.0 does not have its type, or if the value is not one of this type.
 fn value(
     element: &str,
     setting: &Setting,

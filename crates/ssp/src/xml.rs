@@ -106,8 +106,7 @@ impl Scope {
         self.spaces.pop();
     }
 
-    /// Returns the namespace of an element whose declarations were added; `None` without a
-    /// declaration.
+    /// Returns the namespace of an element whose declarations were added; `None` if its prefix is not declared.
     fn space(&self, element: &xml::Element) -> Option<&str> {
         match self.spaces.resolve_prefix(QName(&element.name).prefix(), true) {
             ResolveResult::Bound(space) => Some(space.into_inner()),
@@ -155,7 +154,7 @@ fn prefix(element: &xml::Element) -> &str {
     element.name.split_once(':').map_or("", |(prefix, _)| prefix)
 }
 
-/// An element of a file whose namespaces do not matter.
+/// Converts an element and ignores its namespaces.
 impl From<xml::Element> for Node {
     fn from(element: xml::Element) -> Self {
         let xml::Element { name, text: content, attributes, children, at } = element;

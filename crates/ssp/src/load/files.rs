@@ -24,12 +24,12 @@ const CAPACITY: u64 = 64 << 20;
 pub(super) enum Missing {
     /// The reference is wrong; the sentence belongs to the position of the reference.
     Reference(String),
-    /// The target cannot be read, or its content is wrong; the error names it.
+    /// The target cannot be read, or its content is wrong; the error names the target.
     Content(SspError),
 }
 
 impl Missing {
-    /// Returns the error; `here` converts a sentence about the reference.
+    /// Converts to an error; `here` adds the position of the reference to a sentence.
     pub(super) fn or(self, here: impl Fn(String) -> SspError) -> SspError {
         match self {
             Missing::Reference(sentence) => here(sentence),
@@ -46,7 +46,7 @@ pub(crate) struct Files {
     pub(super) mappings: HashMap<PathBuf, Rc<ParameterMapping>>,
     fmu_indices: HashMap<PathBuf, usize>,
     archives: HashMap<PathBuf, PathBuf>,
-    /// The unpacked archives, which must outlive their use.
+    /// The folders of the unpacked archives, removed on drop.
     pub(crate) folders: Vec<TemporaryFolder>,
     pub(crate) fmus: Vec<Unpacked>,
     /// Names of the FMUs for messages.
@@ -56,7 +56,8 @@ pub(crate) struct Files {
 }
 
 impl Files {
-    /// Returns the SSD at the user's path: the file, or in a folder or SSP `fragment`, else `SystemStructure.ssd`.
+    /// Returns the SSD at the user's path: an SSD file, or in a folder or SSP the SSD called `fragment`, by default
+    /// `SystemStructure.ssd`.
     pub(super) fn document(&mut self, target: &Target) -> Result<Rc<Document>, SspError> {
         let is_ssd = target.path.extension().is_some_and(|extension| extension == "ssd");
         if target.path.is_dir() {
@@ -68,8 +69,8 @@ impl Files {
         self.referred(target, &outside, !is_ssd)
     }
 
-    /// Returns the SSD that a component refers to: the file `target` or, in an `archive`, its SSD `fragment`,
-    /// by default `SystemStructure.ssd`. `base` is the base of the file that contains the component.
+    /// Returns the SSD that a component refers to: the file `target` or, if this is an `archive`, the SSD in it called
+    /// `fragment`, by default `SystemStructure.ssd`. `base` is the base of the file that contains the component.
     pub(super) fn referred(
         &mut self,
         target: &Target,
@@ -125,7 +126,8 @@ impl Files {
         self.warnings.extend(sentences.map(|text| format!("{}: {text}", shown.display())));
     }
 
-    /// Returns the index of the FMU `target`, an archive or a folder; opens it on the first call and adds its warnings.
+    /// Returns the index of the FMU `target`, an archive or a folder; opens the FMU on the first call and adds its
+    /// warnings.
     pub(crate) fn fmu(&mut self, target: &Target) -> Result<usize, SspError> {
         if let Some(known) = self.fmu_indices.get(&target.path) {
             return Ok(*known);
@@ -133,7 +135,7 @@ impl Files {
         let path = &target.path;
         let unpacked = if path.is_dir() { Unpacked::in_folder(path) } else { Unpacked::open(path) };
         let unpacked = unpacked.and_then(|fmu| {
-            // Its library may be built from its source code, which is unpacked for this.
+            // If a library has to be built from source code, all files are unpacked.
             let is_built =
                 !path.is_dir() && fmu.has_sources() && super::check_library(&fmu).is_err();
             if is_built { Unpacked::open_whole(path) } else { Ok(fmu) }
@@ -147,8 +149,8 @@ impl Files {
         Ok(self.fmus.len() - 1)
     }
 
-    /// Returns the content of `source`, inline or in a file that `parse` reads, from `cache` if it was read
-    /// before; `component` is the base of URIs relative to the component.
+    /// Returns the content of `source`: inline, from `cache`, or from a file that `parse` reads. `component` is the
+    /// base of URIs relative to the component.
     pub(super) fn content<T: Clone>(
         &mut self,
         source: &Source<T>,
@@ -192,7 +194,7 @@ impl Files {
         Ok(content)
     }
 
-    /// Returns the dictionary and the name of its file.
+    /// Returns a signal dictionary and the name of its file.
     pub(super) fn dictionary(
         &mut self,
         source: &Source<SignalDictionary>,
@@ -209,7 +211,8 @@ impl Files {
     }
 }
 
-/// Replaces the path of the unpacked copy in the error by the name that the user knows, or adds the name.
+/// Replaces the path of an unpacked copy in the error by the name that the user knows; adds this name if there is no
+/// path.
 fn with_shown_path(error: PackageError, target: &Target) -> SspError {
     let path = target.shown.clone();
     let is_itself = |named: &Path| named == target.path;

@@ -11,7 +11,7 @@ use crate::xml::{Node, finite};
 const STEP: f64 = 0.1;
 /// Maximum number of inputs and of components of a sum.
 const COUNT: usize = 100_000;
-/// The elements that may occur once.
+/// The elements that may occur at most once.
 const ONCE: [&str; 7] =
     ["StartTime", "EndTime", "BaseStepSize", "Algorithm", "Simulators", "Functions", "Connections"];
 
@@ -81,7 +81,7 @@ impl std::fmt::Display for End {
 pub(super) fn read(bytes: &[u8]) -> Result<(Document, Vec<String>), SspError> {
     let element = xml::read(bytes)?;
     let actual = format!("<{}>", element.name);
-    // libcosim uses one namespace.
+    // libcosim uses a single namespace, so that namespaces are ignored.
     let root = Node::from(element);
     if root.name != "OspSystemStructure" {
         return Err(root.wrong("the root element OspSystemStructure", actual));

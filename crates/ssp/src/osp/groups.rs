@@ -21,7 +21,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Vec<Group>, Vec<String>), SspError> 
     Ok((lists.flat_map(|list| &list.children).map(group).collect(), Vec::new()))
 }
 
-/// Reads a group; the name of the element (force, velocity, port, ...) does not matter.
+/// Reads a group from an element of any name (force, velocity, port, ...).
 fn group(node: &Node) -> Group {
     let groups = node.children.iter().filter(|child| child.name != "Variable");
     Group {

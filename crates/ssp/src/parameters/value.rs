@@ -34,7 +34,7 @@ impl Value {
         Value { number, measure }
     }
 
-    /// Returns the value of a parameter; `scopes` may define its unit and its enumeration.
+    /// Returns the value of a parameter; the first of `scopes` with the name of its unit or enumeration defines it.
     pub(super) fn of(parameter: &Parameter, scopes: &[&Definitions]) -> Self {
         let measure = match &parameter.value {
             ParameterValue::Real(_, Some(unit)) => Measure::unit(unit, scopes),
@@ -59,13 +59,13 @@ impl Value {
     }
 
     /// Converts the value to the unit of `there`, then applies the transformation of a mapping; also returns warnings.
-    /// An error sentence if the units measure different quantities or the transformation is for another type.
+    /// Returns an error sentence if the units measure different quantities or the transformation is for another type.
     pub(super) fn convert(
         self,
         conversion: &Conversion,
         there: Measure,
     ) -> Result<(Value, Vec<String>), String> {
-        // A mapping of item names needs no numbers.
+        // An enumeration mapping uses the names of items, so that their numbers may be unknown.
         if let (Some(Stated::Enumeration(pairs)), Number::Item(item, _)) =
             (&conversion.transformation, &self.number)
         {

@@ -44,8 +44,8 @@ fn unit(node: &Node) -> Result<Unit, SspError> {
     Ok(Unit { name: node.required("name")?.to_owned(), base })
 }
 
-/// Reads the type that child elements state: an array if there are dimensions, otherwise a clocked value if a clock
-/// is named, otherwise the element type. `None` if no type is stated; two element types are an error.
+/// Reads the type from child elements: an array if there are dimensions, otherwise a clocked value if a clock is named,
+/// otherwise the type of the type element. `None` if no type is stated; two type elements are an error.
 pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
     let mut stated = None;
     for child in node.ssp_children() {
@@ -57,7 +57,7 @@ pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
             "String" => Type::String,
             "Enumeration" => Type::Enumeration(child.required("name")?.to_owned()),
             "Binary" => Type::Binary,
-            // A connector may contain a second element `Clock`, which names the clock of the value.
+            // An element `Clock` with a name is no type: it names the clock of the value.
             "Clock" if child.attribute("name").is_none() => Type::Clock,
             _ => continue,
         };

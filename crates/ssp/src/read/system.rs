@@ -59,7 +59,7 @@ fn base(node: &Node) -> Result<ElementBase, SspError> {
 fn component(node: &Node) -> Result<Component, SspError> {
     let content = match node.attribute("type") {
         None => Some(Content::Fmu),
-        // A component without a source has only connectors; its type does not matter.
+        // A component without a source has only connectors, so that any type is accepted.
         Some(stated) => {
             Content::named(stated).or(node.attribute("source").is_none().then_some(Content::Fmu))
         }
@@ -117,7 +117,7 @@ fn connection(node: &Node) -> Result<Connection, SspError> {
     }
     let end = |element: &str, connector: &str| {
         let connector = node.required(connector)?.to_owned();
-        // Some tools write an empty name for the surrounding system.
+        // Some tools write an empty element name for the system itself.
         Ok::<_, SspError>(End { element: node.stated(element), connector })
     };
     Ok(Connection {

@@ -1,11 +1,11 @@
-//! A tree of elements that quick-xml writes when it is complete, because the root states the version of SSP that
-//! its content requires.
+//! A tree of elements. quick-xml writes it only when it is complete, because the root states the version of SSP that
+//! the content requires.
 
 use fmu_description::xml::writable;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
-/// The prefixes with their namespaces. Some importers compare prefixes, so these are the usual ones.
+/// The prefixes with their namespaces. The prefixes are the usual ones, because some importers compare them.
 const PREFIXES: [(&str, &str); 6] = [
     ("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription"),
     ("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon"),
@@ -59,7 +59,7 @@ impl Tag {
         self
     }
 
-    /// Inserts `version` behind the namespaces: the lowest version that has all added content.
+    /// Inserts `version` after the namespaces: the lowest version of SSP that allows the content.
     pub(super) fn versioned(mut self) -> Self {
         let version = if self.newer { "2.0" } else { "1.0" };
         let is_namespace = |(name, _): &&(String, String)| name.starts_with("xmlns");

@@ -33,7 +33,7 @@ words! {
         Output = "output",
         Parameter = "parameter",
         CalculatedParameter = "calculatedParameter",
-        /// Of references to signal dictionaries.
+        /// For references to signal dictionaries only.
         Inout = "inout",
         /// SSP 2.0, of FMI 3.0.
         StructuralParameter = "structuralParameter",
@@ -41,7 +41,7 @@ words! {
         Constant = "constant",
         /// SSP 2.0.
         Local = "local",
-        /// SSP 2.0: the variable of the FMU determines the kind, otherwise the connection.
+        /// SSP 2.0: the kind follows from the variable of the FMU or, without one, from the connection.
         Unspecified = "unspecified",
     }
 }
@@ -102,7 +102,7 @@ pub enum Dimension {
     Size(u64),
     /// `sizeConnector`: the connector that states the size.
     Connector(String),
-    /// Neither `size` nor `sizeConnector`.
+    /// Neither `size` nor `sizeConnector` is stated.
     Open,
 }
 

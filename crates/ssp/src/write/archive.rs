@@ -20,8 +20,7 @@ pub(super) struct Archive {
 
 impl Archive {
     /// Adds a file to `resources` and returns its path in the archive. If `name` is in use, appends a number to it.
-    /// The path contains only characters that need no encoding in a URI, because some importers do
-    /// not decode URIs.
+    /// Replaces characters that a URI would have to encode, because some importers do not decode URIs.
     pub(super) fn add(&mut self, name: &str, bytes: Vec<u8>) -> String {
         let plain = |character: char| {
             let is_plain = character.is_ascii_alphanumeric() || "._-".contains(character);
