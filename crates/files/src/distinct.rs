@@ -1,9 +1,9 @@
-//! The rule that a program writes no file that it reads.
+//! Checks that a program does not overwrite its inputs.
 
 use std::path::{Path, PathBuf};
 use std::{fmt, fs};
 
-/// An output that is an input or another output.
+/// The error for an output that is also an input or another output.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OutputConflict(String);
 
@@ -18,8 +18,8 @@ impl std::error::Error for OutputConflict {}
 /// Checks that no output is an input or another output. Each path comes with the option or argument
 /// that names it.
 ///
-/// Two paths are the same file if they lead to one place, also by a link, or differ in case only. An
-/// output that is a pipe or a device is not checked.
+/// Two paths count as the same file if they lead to one file, also by links, or if they differ in case only. An output
+/// that is a pipe or a device is not checked.
 ///
 /// # Errors
 ///

@@ -1,8 +1,8 @@
-//! Reads TOML and keeps the place of every value, so that errors can point at it.
+//! Reads TOML and keeps the place of every value in the text, so that errors can point at the value.
 //!
-//! Structs of `serde` would lose the name and the place of a value before later checks, which compare
-//! several values or compute with them. An error has one place and one message, so a few lines show it
-//! without a crate such as `miette` or `annotate-snippets`.
+//! Structs of `serde` would lose the name and the place of a value, which later checks of several values need. An error
+//! has a single place and message, so that a few lines can show it without a crate such as `miette` or
+//! `annotate-snippets`.
 
 use std::fmt;
 use std::ops::Range;
@@ -53,7 +53,7 @@ impl PlaceError {
         self.column
     }
 
-    /// Returns the text of the line.
+    /// Returns the text of the line with the error.
     #[must_use]
     pub fn shown(&self) -> &str {
         &self.shown
@@ -117,8 +117,8 @@ impl Source {
         })
     }
 
-    /// Returns an error that points at `place`: at its first line, and at the last line if it is beyond the
-    /// text.
+    /// Returns an error that points at `place`: if this has several lines, at its first line; if it is beyond the text,
+    /// at the last line.
     ///
     /// # Panics
     ///
@@ -146,7 +146,7 @@ impl Source {
 pub struct Table<'a> {
     /// The file.
     pub source: &'a Source,
-    /// The name in messages, such as `table` or `list[1]`; empty for the whole file.
+    /// The name of the table in messages, such as `table` or `list[1]`; empty for the whole file.
     name: String,
     /// The place of the table in the text; the start of the text for the whole file.
     pub place: Place,
@@ -158,7 +158,7 @@ pub struct Table<'a> {
 pub struct Entry<'a> {
     /// The file.
     pub source: &'a Source,
-    /// The name in messages: `table.key` or `list[1]`.
+    /// The name of the value in messages: `table.key` or `list[1]`.
     pub name: String,
     /// The place of the value in the text.
     pub place: Place,
@@ -181,8 +181,8 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] at the alphabetically first key that is not in `known`. It names the most similar
-    /// known key, or all of them if none has an edit distance of at most 3.
+    /// [`PlaceError`] at the alphabetically first key that is not in `known`. The message names the most similar known
+    /// key, or all known keys if none has an edit distance of at most 3.
     pub fn allow(&self, known: &[&str]) -> Result<(), PlaceError> {
         let unknown = self.entries.keys().find(|key| !known.contains(&key.get_ref().as_ref()));
         let Some(key) = unknown else {
@@ -215,7 +215,7 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the table if the entry is missing; `meaning` ends the message.
+    /// [`PlaceError`] at the table if the entry is missing; the message ends with `meaning`.
     pub fn require(&self, key: &str, meaning: &str) -> Result<Entry<'a>, PlaceError> {
         self.get(key).ok_or_else(|| {
             let message = format!("`{}` is missing: {meaning}", self.path(key));

@@ -1,8 +1,8 @@
-//! Input files whose errors point at the place, and atomic output files.
+//! Input files with errors that point at the wrong value, and atomic output files.
 //!
-//! [`document`] reads TOML: each value has its name and its place in the text. [`whole`] writes a
-//! file beside its target and renames it. [`check_distinct`] refuses an output that is an
-//! input or another output. [`sentence()`] joins an error and its causes.
+//! [`document`] reads TOML: each value has its name and its place in the text. [`whole`] writes a temporary file beside
+//! the target and renames it. [`check_distinct`] refuses an output that is also an input or another output.
+//! [`sentence()`] joins an error and its causes.
 #![forbid(unsafe_code)]
 
 mod distinct;

@@ -5,7 +5,7 @@ use std::{fs, io, process};
 
 use crate::distinct::is_stream;
 
-/// A written file under a temporary name. [`Pending::commit`] gives it its final name, dropping it removes it.
+/// A written file under a temporary name, which is removed on drop unless [`Pending::commit`] renames it.
 pub struct Pending {
     partial: PathBuf,
     path: PathBuf,
@@ -38,13 +38,13 @@ impl Pending {
 
 impl Drop for Pending {
     fn drop(&mut self) {
-        // Fails after a commit, when the temporary file no longer exists.
+        // Fails after a commit, because the temporary file no longer exists.
         let _ = fs::remove_file(&self.partial);
     }
 }
 
-/// Writes `bytes` to `path` atomically: to a temporary file beside it, which is then renamed.
-/// Creates the folder if it is missing. A pipe or a device gets the bytes itself.
+/// Writes `bytes` to `path` atomically: to a temporary file beside it, which is then renamed. Creates the folder if it
+/// is missing. Writes directly to a pipe or a device.
 ///
 /// # Errors
 ///
