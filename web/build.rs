@@ -1,5 +1,5 @@
-//! Writes the design of a package as Rust, so that its module needs no code that reads a design, and sets an option
-//! of the linker. The design is `design.toml` in the folder of the package, or else the one of the controller FMU.
+//! Writes the design of a package as Rust, so that its WebAssembly module needs no parser for a design. The design is
+//! `design.toml` in the folder of the package or, without this file, that of the controller FMU.
 
 use std::error::Error;
 use std::path::Path;
@@ -17,14 +17,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let design = Design::parse(&fs::read_to_string(file)?, file)?;
     fs::write(Path::new(&env::var("OUT_DIR")?).join("design.rs"), expression(&design))?;
     if env::var("CARGO_CFG_TARGET_FAMILY")? == "wasm" {
-        // Indices of functions and addresses in as few bytes as each needs.
+        // Encodes indices of functions and addresses in the least number of bytes.
         println!("cargo:rustc-cdylib-link-arg=--compress-relocations");
     }
     Ok(())
 }
 
-/// The design as a Rust expression: its debug text, in which lists are `Vec`s, limits arrays and texts `String`s. What
-/// is neither does not compile.
+/// Returns the design as a Rust expression: its debug text, with lists as `Vec`s, limits as arrays and texts as
+/// `String`s. Anything else would not compile.
 fn expression(design: &Design) -> String {
     let text = format!("{design:?}");
     let parts = text.split('"').enumerate().map(|(k, part)| {

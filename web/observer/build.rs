@@ -1,4 +1,4 @@
-//! Writes the augmented plant of the controller FMU as Rust, so that the module needs no code that reads a design.
+//! Writes the augmented plant of the controller FMU as Rust, so that the module needs no parser for a design.
 
 use std::error::Error;
 use std::path::Path;
@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let design = Design::parse(&fs::read_to_string(file)?, file)?;
     let [a, b, c, f_a] = AsoController::of_design(design).plant();
     let plant = FaultyPlant::with_constant_faults(a, b, c, f_a);
-    // Here, so that the module needs no code for a plant without an observer.
+    // Checked here, so that the module needs no code for a plant without an observer.
     plant.check_observer_exists()?;
     let (dynamics, output) = (plant.augmented_dynamics(), plant.augmented_output());
     let text = format!(

@@ -1,4 +1,4 @@
-//! The functions of the WebAssembly module: numbers, and one buffer for texts and rows.
+//! The functions of the WebAssembly module. They pass numbers, a text in the text buffer, and rows by their address.
 #![allow(unsafe_code, reason = "exported names")]
 
 use std::cell::RefCell;
@@ -41,9 +41,9 @@ pub extern "C" fn set() -> i32 {
     with(&mut |run| run.set(name.trim(), value.trim()))
 }
 
-/// Makes up to `steps` steps. Keeps a row after each step whose number since the start is a multiple of `every`,
-/// and after the last one of the run; returns 1 if a step failed. So a row is older than a change that is made at its
-/// time, as in the results of the command.
+/// Makes up to `steps` steps. Keeps a row after each step whose number since the start is a multiple of `every`, and
+/// after the last step of the run; returns 1 if a step failed. As in the results of the command, a row does not show a
+/// change that is made at its time.
 #[unsafe(no_mangle)]
 pub extern "C" fn advance(steps: u32, every: u32) -> i32 {
     ROWS.with_borrow_mut(Vec::clear);
@@ -61,13 +61,13 @@ pub extern "C" fn advance(steps: u32, every: u32) -> i32 {
     })
 }
 
-/// The time of the run in s; NaN: no run is started.
+/// The time of the run in s; NaN if no run is started.
 #[unsafe(no_mangle)]
 pub extern "C" fn time() -> f64 {
     RUN.with_borrow(|run| run.as_ref().map_or(f64::NAN, Run::time))
 }
 
-/// Whether the stop time is reached: 1, or no run is started.
+/// Returns 1 if the stop time is reached or no run is started.
 #[unsafe(no_mangle)]
 pub extern "C" fn is_finished() -> i32 {
     RUN.with_borrow(|run| run.as_ref().is_none_or(Run::is_finished).into())
@@ -91,7 +91,7 @@ pub extern "C" fn save() -> i32 {
     with(&mut Run::save)
 }
 
-/// Goes back to the state saved last; returns 1 if none is kept.
+/// Returns to the state saved last; returns 1 if there is none.
 #[unsafe(no_mangle)]
 pub extern "C" fn back() -> i32 {
     with(&mut Run::back)

@@ -1,4 +1,4 @@
-//! The experiment of the paper in one program: plant, controller and master, as native.
+//! The experiment of the paper: plant, controller and master in one program.
 #![deny(unsafe_code)]
 
 mod exports;

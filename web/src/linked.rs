@@ -1,5 +1,5 @@
-//! A linked model as a [`Slave`] of the master. It saves its state in memory; the functions that serialise
-//! it would be a tenth of the module.
+//! A linked model as a [`Slave`] of the master. States are saved in memory only: functions that serialise a state would
+//! be a tenth of the module.
 
 use fmu::description::{Experiment, ModelDescription};
 use fmu::{Linked, Model};
@@ -29,7 +29,7 @@ impl<M: Model> LinkedSlave<M> {
     }
 }
 
-/// Integers of FMI 2.0 as the master has them.
+/// Converts integers of the master to those of FMI 2.0.
 fn narrow(function: &'static str, values: &[i64]) -> Result<Vec<i32>, CallError> {
     let refused = |_| {
         let failure = Failure::InvalidAnswer("takes integers of 32 bits only".to_owned());

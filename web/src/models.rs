@@ -1,4 +1,4 @@
-//! The models of the paper, and what the page shows of them.
+//! The models of the paper, and the variables that the page shows.
 
 use aso_controller::Design;
 

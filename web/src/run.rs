@@ -24,7 +24,7 @@ const SAVED: usize = 240;
 pub struct Run {
     simulation: Simulation,
     probe: Probe,
-    /// From the oldest to the newest, in slots that follow one another, modulo [`SAVED`].
+    /// The saved states, oldest first, with the number of steps. Their slots are consecutive modulo [`SAVED`].
     saved: VecDeque<(KeptState, u64)>,
     /// Number of steps made.
     steps: u64,
@@ -120,7 +120,7 @@ impl Run {
         read.map(|()| row).map_err(told)
     }
 
-    /// Saves the present state, for [`Run::back`]; of many, the oldest is dropped.
+    /// Saves the present state for [`Run::back`]; if [`SAVED`] states are kept, drops the oldest.
     ///
     /// # Errors
     ///
@@ -134,7 +134,7 @@ impl Run {
         Ok(())
     }
 
-    /// Returns to the state saved last, and forgets it.
+    /// Returns to the state saved last, and drops this state.
     ///
     /// # Errors
     ///
@@ -147,7 +147,7 @@ impl Run {
     }
 }
 
-/// Reads a value of the variable `name` at `port`.
+/// Parses `text` as a value of the variable `name` at `port`.
 fn parsed(system: &System, port: Port, name: &str, text: &str) -> Result<Value, String> {
     let (value, expected) = match system.variable(port).kind {
         Kind::Real(_) => (text::number(text).map(Value::Real), "a number"),
@@ -157,7 +157,7 @@ fn parsed(system: &System, port: Port, name: &str, text: &str) -> Result<Value, 
     value.ok_or_else(|| format!("{name}={text}: expected {expected}"))
 }
 
-/// A model that needs no resources.
+/// Creates a model that needs no resources.
 fn model<M: fmu::Model>() -> Result<M, String> {
     M::new("".as_ref()).map_err(|failure| failure.to_string())
 }

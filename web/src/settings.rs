@@ -1,4 +1,4 @@
-//! What the page sets before a run: values of variables, faults.
+//! The settings of a run that the page makes: values of variables, and faults.
 
 use files::sentence;
 use master::fault::{Fault, FaultChain, NoiseDistribution, RandomSeries, Window};
@@ -11,7 +11,7 @@ use crate::text;
 pub(crate) struct Settings {
     /// Variables and their values, as text.
     pub(crate) values: Vec<(String, String)>,
-    /// Inputs and the faults on their connections, in this order.
+    /// Inputs, each with the kind and the number of the fault on its connection.
     faults: Vec<(String, FaultKind, f64)>,
     /// Time in s from which the faults act.
     from: f64,

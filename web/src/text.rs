@@ -1,4 +1,4 @@
-//! The buffer through which a module and the page pass texts, and numbers in texts.
+//! The buffer by which a module and the page exchange texts, and the parsing of numbers in texts.
 #![allow(unsafe_code, reason = "exported names")]
 
 use std::cell::RefCell;
@@ -16,7 +16,7 @@ pub extern "C" fn text(length: usize) -> *mut u8 {
     })
 }
 
-/// The length of the text buffer, which holds the sentence after a function returned 1.
+/// The length of the text buffer. After a function returned 1, the buffer holds the error message.
 #[unsafe(no_mangle)]
 pub extern "C" fn text_length() -> usize {
     TEXT.with_borrow(Vec::len)
@@ -27,7 +27,7 @@ pub(crate) fn read() -> String {
     TEXT.with_borrow(|text| String::from_utf8_lossy(text).into_owned())
 }
 
-/// The finite number that `text` states. The page reads it: the tables of `f64::from_str` have 10 kB.
+/// Parses a finite number. The page does it, because the tables of `f64::from_str` have 10 kB.
 #[cfg(target_family = "wasm")]
 pub(crate) fn number(text: &str) -> Option<f64> {
     #[link(wasm_import_module = "page")]
@@ -38,13 +38,13 @@ pub(crate) fn number(text: &str) -> Option<f64> {
     Some(unsafe { number(text.as_ptr(), text.len()) }).filter(|value| value.is_finite())
 }
 
-/// The finite number that `text` states.
+/// Parses a finite number.
 #[cfg(not(target_family = "wasm"))]
 pub(crate) fn number(text: &str) -> Option<f64> {
     text.parse().ok().filter(|value: &f64| value.is_finite())
 }
 
-/// The status of a function, 0 or 1; puts its text or its failure into the buffer.
+/// Returns the status of an exported function, 0 or 1, and puts its text or its error message into the buffer.
 pub(crate) fn answer(done: Result<Option<String>, String>) -> i32 {
     let (status, text) = match done {
         Ok(text) => (0, text),

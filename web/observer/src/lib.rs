@@ -1,4 +1,4 @@
-//! The gains of an observer with other eigenvalues than those of the paper, by the function of `aso-ftc design`.
+//! Computes the gains of an observer for given eigenvalues, with the function that `aso-ftc design` uses.
 #![deny(unsafe_code)]
 
 #[path = "../../src/text.rs"]
@@ -11,9 +11,9 @@ use nalgebra::{Complex, DMatrix};
 // The augmented plant: A_0 and C_0, column by column, and their sizes.
 include!(concat!(env!("OUT_DIR"), "/plant.rs"));
 
-/// Replaces the eigenvalues in the text buffer, in 1/s, by the gains: lines `controller.variable=value`; returns 0. An
-/// eigenvalue is `-900`, `-900+200i` or `-900±200i`, which is a pair. Returns 1, with a sentence in the buffer, if the
-/// text is wrong or no observer has these eigenvalues.
+/// Replaces the eigenvalues in the text buffer, in 1/s, by lines `controller.variable=value` with the gains; returns 0.
+/// An eigenvalue is `-900`, `-900+200i` or, for a pair, `-900±200i`. Returns 1, with an error message in the buffer, if
+/// the text is wrong or no observer has these eigenvalues.
 #[allow(unsafe_code, reason = "exported name")]
 #[unsafe(no_mangle)]
 pub extern "C" fn place() -> i32 {
@@ -63,7 +63,7 @@ fn parse(part: &str) -> Option<Vec<Complex<f64>>> {
         let pole = Complex::new(text::number(real)?, text::number(imaginary)?);
         return Some(vec![pole, pole.conj()]);
     }
-    // The last sign that is not the sign of an exponent.
+    // Splits before the last sign that does not belong to an exponent.
     let bytes = complex.as_bytes();
     let is_sign =
         |k: &usize| matches!(bytes[*k], b'+' | b'-') && !matches!(bytes[k - 1], b'e' | b'E');

@@ -1,4 +1,4 @@
-//! The three tanks with the controller that detects faults, in one program: plant, controller and master, as native.
+//! The three tanks with a controller that detects faults: plant, controller and master in one program.
 #![deny(unsafe_code)]
 
 #[path = "../../src/exports.rs"]
