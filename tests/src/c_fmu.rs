@@ -16,7 +16,7 @@ const SOURCES: [&str; 6] = ["deeds.c", "files.c", "life.c", "process.c", "steps.
 /// Libraries that this process has built, by the definitions given to the compiler.
 static LIBRARIES: Mutex<BTreeMap<Vec<String>, Vec<u8>>> = Mutex::new(BTreeMap::new());
 
-/// An FMU in C that is still to be built.
+/// The description of an FMU in C, which [`CFmu::write`] builds.
 #[derive(Clone, Debug)]
 pub struct CFmu {
     behaviour: String,
@@ -25,7 +25,7 @@ pub struct CFmu {
     root_attributes: String,
     experiment: String,
     library_name: String,
-    /// Whether it has source code in the place of a library.
+    /// Whether the FMU has source code in place of a library.
     in_source: bool,
     /// Further variables, as XML.
     variables: String,
@@ -34,7 +34,7 @@ pub struct CFmu {
 }
 
 impl CFmu {
-    /// An FMU whose parameter `behaviour` has this start value.
+    /// Creates an FMU whose parameter `behaviour` has this start value.
     #[must_use]
     pub fn that(behaviour: &str) -> Self {
         let flags = [
@@ -57,26 +57,26 @@ impl CFmu {
         }
     }
 
-    /// An FMU without misbehaviour.
+    /// Creates an FMU without misbehaviour.
     #[must_use]
     pub fn well_behaved() -> Self {
         Self::that("as it should")
     }
 
-    /// The same with an attribute of the element `CoSimulation`.
+    /// Sets an attribute of the element `CoSimulation`.
     #[must_use]
     pub fn flag(mut self, name: &str, value: bool) -> Self {
         self.flags.insert(name.to_owned(), value.to_string());
         self
     }
 
-    /// The same, without saving and restoring of its state.
+    /// Removes the capability to save and restore states.
     #[must_use]
     pub fn without_rollback(self) -> Self {
         self.flag("canGetAndSetFMUstate", false).flag("canSerializeFMUstate", false)
     }
 
-    /// The same without some functions of the standard.
+    /// Removes functions of the standard from the library.
     #[must_use]
     pub fn without(mut self, functions: &[&str]) -> Self {
         let renamed = functions.iter().map(|function| format!("-D{function}=left_out_{function}"));
@@ -84,43 +84,42 @@ impl CFmu {
         self
     }
 
-    /// The same, whose library calls this function, which no library defines, in the deed "call a missing
-    /// function".
+    /// Sets the function that the deed "call a missing function" calls; no library defines it.
     #[must_use]
     pub fn calling(mut self, function: &str) -> Self {
         self.definitions.push(format!("-DMISSING={function}"));
         self
     }
 
-    /// The same, whose library does this deed at a `moment`: `ON_LOAD`, `ON_UNLOAD`, or `AT_EXIT`.
+    /// Makes the library do a deed of `tests/c/slave.h` at a `moment`: `ON_LOAD`, `ON_UNLOAD`, or `AT_EXIT`.
     #[must_use]
     pub fn doing(mut self, deed: &str, moment: &str) -> Self {
         self.definitions.push(format!("-D{moment}=\"{deed}\""));
         self
     }
 
-    /// The same, with another name of its library than the model identifier.
+    /// Gives the library this name, other than the model identifier.
     #[must_use]
     pub fn in_library(mut self, name: &str) -> Self {
         name.clone_into(&mut self.library_name);
         self
     }
 
-    /// The same, with source code in the place of a library.
+    /// Replaces the library by source code.
     #[must_use]
     pub fn in_source(mut self) -> Self {
         self.in_source = true;
         self
     }
 
-    /// The same, with another result of `fmi2GetVersion`.
+    /// Sets the result of `fmi2GetVersion`.
     #[must_use]
     pub fn version(mut self, version: &str) -> Self {
         self.definitions.push(format!("-DVERSION=\"{version}\""));
         self
     }
 
-    /// The same, with a local Real `hidden` that cannot be read.
+    /// Adds a local Real `hidden` that cannot be read.
     #[must_use]
     pub fn with_unreadable_variable(mut self) -> Self {
         self.variables.push_str(
@@ -129,36 +128,36 @@ impl CFmu {
         self
     }
 
-    /// The same, with units for input u and output y.
+    /// Sets the units of input u and output y.
     #[must_use]
     pub fn with_units(mut self, u: &str, y: &str) -> Self {
         self.units = Some([u.to_owned(), y.to_owned()]);
         self
     }
 
-    /// The same, declaring first derivatives of its outputs.
+    /// Declares that the FMU provides first derivatives of its outputs.
     #[must_use]
     pub fn promising_output_derivatives(mut self) -> Self {
         self.flags.insert("maxOutputDerivativeOrder".to_owned(), "1".to_owned());
         self
     }
 
-    /// The same, with these attributes of the default experiment.
+    /// Sets the attributes of the default experiment.
     #[must_use]
     pub fn experiment(mut self, attributes: &str) -> Self {
         self.experiment = format!("<DefaultExperiment {attributes}/>\n");
         self
     }
 
-    /// The same, with a default step of `size` s.
+    /// Sets the default step to `size` s.
     #[must_use]
     pub fn proposing(mut self, size: f64) -> Self {
         self.experiment = format!("<DefaultExperiment stopTime=\"1\" stepSize=\"{size}\"/>\n");
         self
     }
 
-    /// The same, whose `fmi2GetVersion` returns the text that `symbol` points to; another library
-    /// in the process must define it.
+    /// Makes `fmi2GetVersion` return the text that `symbol` points to, which another library in the process must
+    /// define.
     #[must_use]
     pub fn expecting(mut self, symbol: &str) -> Self {
         let value = format!("({{ extern const char *{symbol}; {symbol}; }})");
@@ -166,14 +165,14 @@ impl CFmu {
         self
     }
 
-    /// The same, exported by this tool and needing it to run.
+    /// States this tool as the exporter, and that the FMU needs it to run.
     #[must_use]
     pub fn needing(mut self, tool: &str) -> Self {
         let _ = write!(self.root_attributes, " generationTool=\"{tool}\"");
         self.flag("needsExecutionTool", true)
     }
 
-    /// Writes it to `folder/name.fmu`.
+    /// Builds the FMU and writes it to `folder/name.fmu`.
     ///
     /// # Panics
     ///

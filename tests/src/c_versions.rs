@@ -66,7 +66,8 @@ fn version_3(folder: &Path, token: &str, interface: &str, file: &str) -> PathBuf
 /// The files of an FMU, by path.
 type Files = [(&'static str, String)];
 
-/// Writes `source`, without its extension, as an FMU of FMI 3.0 with this description and further files to `folder`.
+/// Builds `source`, a name without extension, and writes it to `folder` as an FMU of FMI 3.0 with this description and
+/// further files.
 pub(crate) fn fmu_3(
     folder: &Path,
     source: &'static str,
@@ -84,8 +85,8 @@ pub(crate) fn fmu_3(
     written(&package, folder, name)
 }
 
-/// Returns the file of terminals with a network terminal of FMI-LS-BUS: its name, and the variables `Tx_Clock`, `Tx_Data`,
-/// `Rx_Clock` and `Rx_Data`.
+/// Returns the file of terminals, with one network terminal of FMI-LS-BUS of this name. `variables` are the variables
+/// for its members `Tx_Clock`, `Tx_Data`, `Rx_Clock` and `Rx_Data`.
 pub(crate) fn transceiver(name: &str, variables: [&str; 4]) -> [(&'static str, String); 1] {
     [(terminals::PATH, transceivers(&[(name, variables)]))]
 }

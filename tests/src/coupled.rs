@@ -10,14 +10,14 @@ use tempfile::TempDir;
 use crate::c_fmu::CFmu;
 use crate::command;
 
-/// Communication step of the runs in s, a power of two: sums of it are exact.
+/// Communication step of the runs in s, a power of two, so that its multiples are exact.
 pub const STEP: f64 = 1.0 / 16.0;
 
 /// Number of rows of a complete run.
 pub const ALL: usize = 17;
-/// Number of rows of a run that ends at the last successful step, to t1.
+/// Number of rows of a run whose last successful step ends at t1.
 pub const TO_T1: usize = 9;
-/// Behaviour that is unusual and harmless.
+/// Values of `behaviour` that are unusual but harmless.
 pub const UNUSUAL: [&str; 15] = [
     "as it should",
     "pend",
@@ -36,7 +36,7 @@ pub const UNUSUAL: [&str; 15] = [
     "leak in fmi2DoStep",
 ];
 
-/// A run that takes longer than this counts as hung.
+/// Time after which a run counts as hung.
 const PATIENCE: Duration = Duration::from_secs(300);
 
 /// A run of `aso-ftc run` that has ended.
@@ -49,8 +49,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// Couples `fmus` by name in steps of [`STEP`] to 1 s; `more` can change that. FMUs with the
-    /// same behaviour share one file.
+    /// Runs `fmus` (names and FMUs) with steps of [`STEP`] to 1 s; `more` has further options, which may change step
+    /// and stop time. Equal FMUs share one file.
     ///
     /// # Panics
     ///
@@ -83,7 +83,7 @@ impl Run {
         Self { folder, status, message }
     }
 
-    /// `a` with an input of 1, and `b`, well behaved, whose input is the output of `a`.
+    /// Runs `a`, and a well-behaved `b` whose input is the output of `a`.
     #[must_use]
     pub fn pair(a: &CFmu, more: &[&str]) -> Self {
         let connected = ["--connect", "a.y=b.u"].iter().chain(more).copied();
@@ -91,7 +91,7 @@ impl Run {
         Self::of(&[("a", a), ("b", &CFmu::well_behaved())], &recorded.collect::<Vec<_>>())
     }
 
-    /// The values of a column of `results.csv`; `None` if there is no such file.
+    /// The values of a column of `results.csv`; empty if there is no such file.
     ///
     /// # Panics
     ///
@@ -114,7 +114,7 @@ impl Run {
     ///
     /// # Panics
     ///
-    /// As [`Run::column`], and if an entry is no number.
+    /// Same as [`Run::column`], and if an entry is no number.
     #[must_use]
     pub fn numbers(&self, name: &str) -> Vec<f64> {
         let number = |entry: &String| {
@@ -123,8 +123,8 @@ impl Run {
         self.column(name).iter().map(number).collect()
     }
 
-    /// Checks that a [`Run::pair`] ended with `status` and that its first `count` rows exist and
-    /// are right: a.y is the time, b.y the sum of a.y over the steps.
+    /// Checks that a [`Run::pair`] ended with `status` and that its first `count` rows are right: a.y is the time, b.y
+    /// the sum of [`STEP`] times a.y over the steps before.
     ///
     /// # Panics
     ///
@@ -155,7 +155,7 @@ impl Run {
     }
 }
 
-/// Runs the command in `folder`; returns exit status and standard error.
+/// Runs the command in `folder`; returns the exit status and the text on standard error.
 fn end(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     let file = |name: &str| File::create(folder.join(name)).map(Stdio::from);
     let streams = file("stdout").and_then(|out| Ok((out, file("stderr")?)));

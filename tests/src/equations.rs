@@ -8,20 +8,19 @@ use fmu_description::package::{Package, platforms};
 
 use crate::root;
 
-/// Value references of Reals.
+/// Value reference of the input u. The constants up to [`P`] are references of Reals, the further ones of Integers.
 pub const U: u32 = 0;
-/// The decay.
+/// The state that decays.
 pub const X: u32 = 1;
 /// Height of the ball.
 pub const H: u32 = 2;
 /// Velocity of the ball.
 pub const V: u32 = 3;
-/// The part of a lap.
+/// The part of a lap that is done.
 pub const P: u32 = 4;
-/// Value references of Integers: the discrete input, its copy, the counters of time events, of step
-/// events, of state events.
+/// The discrete input.
 pub const MODE: u32 = 0;
-/// The discrete input at the last event.
+/// The value of the discrete input at the last event.
 pub const MODE_OUT: u32 = 1;
 /// Number of time events.
 pub const TICKS: u32 = 2;

@@ -14,7 +14,7 @@ pub fn options() -> Options {
     Options { executable: Some(command().to_owned()), ..Options::default() }
 }
 
-/// As [`options`], with a time limit for each call.
+/// Same as [`options`], with a time limit for each call.
 #[must_use]
 pub fn limited(milliseconds: u64) -> Options {
     Options { time_limit: Some(Duration::from_millis(milliseconds)), ..options() }

@@ -32,9 +32,9 @@ pub fn root() -> PathBuf {
     tests.parent().unwrap_or(tests).to_owned()
 }
 
-/// The program of the package `name`, built if the environment variable `BUILT_PROGRAMS` does not name
-/// the folder of the built programs. `scripts/test` sets it: a package built alone would give the crates
-/// that it shares with the others other features, and all of them would be compiled once more.
+/// The program of the package `name`, from the folder in the environment variable `BUILT_PROGRAMS`; built if it is not
+/// set. `scripts/test` sets it, because cargo may choose other features for a package built alone, and would compile
+/// the shared crates again.
 ///
 /// # Panics
 ///
@@ -100,7 +100,7 @@ pub fn closed_loop(settings: &[(&str, &str)]) -> System {
     closed_loop_of("FrictionPendulum.fmu", "AsoController.fmu", settings)
 }
 
-/// The same of these files in [`dist`].
+/// Same as [`closed_loop`], with the FMUs in these files in [`dist`].
 ///
 /// # Panics
 ///
@@ -135,7 +135,7 @@ pub fn simulation(system: System, algorithm: &Algorithm, names: &[&str]) -> (Sim
     (simulation.unwrap_or_else(|error| panic!("{error}")), probe)
 }
 
-/// A table of numbers with named columns, as our CSV files hold them; an empty cell is NaN. Lines from `#` are skipped.
+/// A table of numbers with named columns, read from CSV; an empty cell is NaN. Lines that start with `#` are skipped.
 pub struct Table {
     names: Vec<String>,
     rows: Vec<Vec<f64>>,

@@ -8,10 +8,10 @@ use fmu_description::ModelDescription;
 use master::{CallError, Slave, StepResult};
 use nalgebra::{DMatrix, DVector};
 
-/// Value reference of the first output; inputs start at 0.
+/// Value reference of the first output; those of inputs start at 0.
 pub const OUTPUTS: u32 = 100;
 
-/// `x' = A x + B u`, `y = C x + D u`, from `x(0)`.
+/// A linear system `x' = A x + B u`, `y = C x + D u` with n states, m inputs and p outputs, from `x(0)`.
 #[derive(Clone)]
 pub struct Block {
     /// A, n x n.
@@ -27,7 +27,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// From rows.
+    /// Creates a block from the rows of its matrices.
     #[must_use]
     pub fn new(a: &[&[f64]], b: &[&[f64]], c: &[&[f64]], d: &[&[f64]], start: &[f64]) -> Self {
         let of = |rows: &[&[f64]]| {
@@ -52,7 +52,7 @@ pub struct Abilities {
 /// All capabilities.
 pub const ABLE: Abilities = Abilities { interpolates: true, derivatives: 2, directional: true };
 
-/// The variable data: x, then u, u' and u''.
+/// State, inputs and derivatives of the inputs: x, u, u', u''.
 type State = DVector<f64>;
 
 /// A slave that simulates a [`Block`].
@@ -60,7 +60,7 @@ pub struct Linear {
     description: ModelDescription,
     block: Block,
     state: State,
-    /// `exp(M h)` for the size h of the last step, M the matrix of x, u, u', u''.
+    /// M in `z' = M z` for z = (x, u, u', u''). `propagator` is the last step size h and `exp(M h)`.
     matrix: DMatrix<f64>,
     propagator: (f64, DMatrix<f64>),
     slots: Vec<Option<State>>,
@@ -68,7 +68,7 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// `steps` counts `fmi2DoStep`.
+    /// Creates a slave; `steps` counts its calls of `fmi2DoStep`.
     pub fn boxed(block: &Block, able: Abilities, steps: &Arc<AtomicUsize>) -> Box<Self> {
         let (n, m) = (block.a.nrows(), block.b.ncols());
         let mut matrix = DMatrix::zeros(n + 3 * m, n + 3 * m);
@@ -101,7 +101,7 @@ impl Linear {
         n + order * m + reference as usize
     }
 
-    /// y, y' or y''.
+    /// The outputs y (order 0), y' (1) or y'' (2).
     fn output(&self, order: i32) -> DVector<f64> {
         let [x, u, slope, curvature] = self.split();
         let Block { a, b, c, d, .. } = &self.block;
@@ -167,7 +167,7 @@ impl Slave for Linear {
         Ok(())
     }
 
-    /// Setting a value alone holds it: its derivatives are 0 until they are set.
+    /// Sets inputs; their derivatives are 0 until they are set.
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Done {
         for (&value, &reference) in values.iter().zip(references) {
             for (order, value) in [value, 0.0, 0.0].into_iter().enumerate() {

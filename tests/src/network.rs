@@ -22,12 +22,11 @@ pub struct Network {
 /// The results of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
-    /// Largest error of an output at a communication point, absolute.
+    /// Largest absolute error of an output, at communication points that end a step of every slave.
     pub error: f64,
-    /// The same in the second half of the run, when errors of lower order from the first steps have
-    /// decayed.
+    /// [`Run::error`] in the second half of the run, when errors of lower order from the first steps have decayed.
     pub late: f64,
-    /// As `late`, at communication points between the ends of the steps of slaves with multiples.
+    /// Largest error in the second half of the run, at the other communication points.
     pub between: f64,
     /// Number of communication steps.
     pub points: usize,
@@ -43,7 +42,7 @@ fn name(position: usize) -> String {
 }
 
 impl Network {
-    /// The slaves, connected; `steps` counts their steps.
+    /// Returns the system of connected slaves; `steps` counts their steps.
     ///
     /// # Panics
     ///
@@ -61,9 +60,9 @@ impl Network {
         system
     }
 
-    /// Returns M, N and x(0) of the whole network, `x' = M x`, `y = N x`.
+    /// Returns M, N and x(0) of the whole network `x' = M x`, `y = N x`, where x and y stack those of all blocks.
     ///
-    /// With the connections `u = P y`, `N = (I - D P)^-1 C` and `M = A + B P N`.
+    /// With the connections `u = P y` and the block-diagonal A to D, `N = (I - D P)^-1 C` and `M = A + B P N`.
     fn whole(&self) -> (DMatrix<f64>, DMatrix<f64>, DVector<f64>) {
         let stack = |of: fn(&Block) -> &DMatrix<f64>| {
             let parts: Vec<_> = self.blocks.iter().map(of).collect();
@@ -106,7 +105,7 @@ impl Network {
     ///
     /// # Panics
     ///
-    /// If a slave does not have them.
+    /// If a slave lacks an output.
     pub fn outputs(&self, system: &mut System) -> Vec<f64> {
         let mut all = Vec::new();
         for ((_, slave), block) in system.slaves.iter_mut().zip(&self.blocks) {
@@ -164,7 +163,7 @@ impl Network {
             slow.apply(&simulation, &mut readout);
             let readings = DVector::from_column_slice(&readout.reals);
             let error = largest(&(readings - exact));
-            // A slave with a multiple of the step is within its step.
+            // A slave whose step is a multiple of the communication step is in the middle of its step.
             if !run.points.is_multiple_of(common) {
                 run.between = run.between.max(if time > 0.5 * stop { error } else { 0.0 });
                 continue;
@@ -179,7 +178,7 @@ impl Network {
     }
 }
 
-/// The largest magnitude; infinity if one value is NaN.
+/// The largest magnitude; infinity if a value is NaN.
 fn largest(errors: &DVector<f64>) -> f64 {
     errors.iter().fold(
         0.0,

@@ -25,8 +25,8 @@ pub fn coupled_oscillators() -> Network {
 /// The linear two-mass oscillator, coupled by force and displacement, with the given stiffness in
 /// N/m and damping in N s/m of the coupling.
 ///
-/// The first mass gets the force of the coupling spring and damper. They belong to the second mass,
-/// which gets displacement and velocity of the first; its force depends directly on these.
+/// Spring and damper of the coupling belong to the block of the second mass. This block gets displacement and velocity
+/// of the first mass, on which its output, the force on the first mass, depends directly.
 #[must_use]
 pub fn two_masses(stiffness: f64, damping: f64) -> Network {
     let first = Block::new(
@@ -49,8 +49,8 @@ pub fn two_masses(stiffness: f64, damping: f64) -> Network {
     }
 }
 
-/// Two first-order lags with direct feedthrough in a circle: `y = x + g u` each. The algebraic loop
-/// has the gain `g1 g2`.
+/// Two first-order lags with direct feedthrough, `y = x + g u`, each with the output of the other as input. The
+/// algebraic loop has the gain `g1 g2`.
 #[must_use]
 pub fn algebraic_loop(first: f64, second: f64) -> Network {
     let lag = |rate: f64, gain: f64, start: f64| {
@@ -62,8 +62,7 @@ pub fn algebraic_loop(first: f64, second: f64) -> Network {
     }
 }
 
-/// A fast lag (10 ms), with initial value 1, behind a slow oscillator: a short transient, then a
-/// smooth solution.
+/// A fast lag (10 ms, initial value 1) in a loop with a slow oscillator: a short transient, then a smooth solution.
 #[must_use]
 pub fn transient() -> Network {
     let fast = Block::new(&[&[-100.0]], &[&[100.0]], &[&[1.0]], &[&[0.0]], &[1.0]);

@@ -14,11 +14,11 @@ pub fn write(folder: &Path) -> PathBuf {
     write_with(folder, "", "")
 }
 
-/// Like [`write()`], with `to` in place of `from` in the model description.
+/// Same as [`write()`], with `to` in place of `from` in the model description.
 ///
 /// # Panics
 ///
-/// Same as [`write()`]; if the description has no `from`.
+/// Same as [`write()`]; also if the description does not contain `from`.
 #[must_use]
 pub fn write_with(folder: &Path, from: &str, to: &str) -> PathBuf {
     assert!(DESCRIPTION.contains(from), "{from}");

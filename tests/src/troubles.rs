@@ -39,7 +39,7 @@ pub enum Trouble {
     PrintFlood,
 }
 
-/// The unpacked FMU, compiled once for this process.
+/// The folder of the unpacked FMU, compiled once for this process.
 ///
 /// # Panics
 ///
