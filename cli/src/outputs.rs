@@ -101,8 +101,8 @@ impl Replacement {
     }
 }
 
-/// Writes `bytes` to `path`, completely or not at all; creates its folder if necessary. A pipe or a device gets the
-/// bytes itself.
+/// Writes `bytes` to `path`, completely or not at all; creates its folder if necessary. Writes directly to a pipe or a
+/// device.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     files::whole::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
