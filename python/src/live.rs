@@ -18,7 +18,7 @@ pub(crate) struct LiveView {
 }
 
 impl LiveView {
-    /// Calls `act` with the view, unless it has ended.
+    /// Calls `act` with the view, unless the view has ended.
     fn with(&self, act: impl FnOnce(&View)) {
         if let Some(view) = &*self.view.lock().unwrap_or_else(PoisonError::into_inner) {
             act(view);

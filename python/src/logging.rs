@@ -57,7 +57,7 @@ pub(crate) fn start() {
     let _ = tracing::subscriber::set_global_default(Collector);
 }
 
-/// Reads from Python's `logging` the lowest level that is passed on; keeps the former one if this fails.
+/// Reads from Python's `logging` the lowest level that is passed on; keeps the present level if this fails.
 pub(crate) fn adopt_level(py: Python<'_>) {
     let level = || py.import(MODULE)?.call_method0("level")?.extract::<u32>();
     if let Ok(level) = level() {

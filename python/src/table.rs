@@ -244,7 +244,7 @@ impl Table {
             Values::Integer(list) => list[0].into_bound_py_any(py),
             Values::Long(list) => list[0].into_bound_py_any(py),
             Values::Boolean(list) => list[0].into_bound_py_any(py),
-            // The offsets of a slice count from the start of the whole array.
+            // Read by Arrow, because the offsets of a slice count from the start of the whole array.
             Values::String(_) => one.as_string::<i64>().value(0).into_bound_py_any(py),
         }
     }

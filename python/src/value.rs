@@ -30,7 +30,7 @@ pub(crate) fn settable(system: &System, name: &str) -> Result<Port, Exception> {
     Err(Exception::new("ConfigurationError", "Role", sentence))
 }
 
-/// Sets a variable to a value of Python. An error of the FMU states `time` in s; a value of another type is a
+/// Sets a variable to a value of Python. An error of the FMU states `time` in s; a value of the wrong type raises a
 /// `ConfigurationError`.
 pub(crate) fn set(
     system: &mut System,
@@ -44,7 +44,7 @@ pub(crate) fn set(
         ValueType::Boolean if value.is_instance_of::<PyString>() => {
             Err(PyTypeError::new_err("expected True or False, found a text"))
         }
-        // Any object has a truth value, also None and a list.
+        // Requires a number, because any object has a truth value, also None and a list.
         ValueType::Boolean => value.extract().map(|number: f64| Value::Boolean(number != 0.0)),
         ValueType::String => value.extract().map(Value::String),
         ValueType::Binary => value.extract().map(Value::Binary),

@@ -34,7 +34,7 @@ impl Cancel {
         Self::default()
     }
 
-    /// Ends the runs that have this object, each after its present step.
+    /// Ends the runs that were given this object, each after its present step.
     fn cancel(&self) {
         self.flag.store(true, Ordering::Relaxed);
     }
@@ -111,7 +111,7 @@ pub(crate) struct Watch {
     progress: Progress,
     /// Whether Python handles signals in this thread.
     is_main: bool,
-    /// Number of steps until the next reading of the clock.
+    /// Number of remaining steps until the next reading of the clock.
     left: u32,
     /// Number of steps between two readings of the clock; 0 before the first reading.
     stride: u32,
