@@ -13,7 +13,7 @@ const FONTS: &str = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif";
 /// A point on the page in SVG units: x to the right, y down.
 type Place = (f64, f64);
 
-/// The part of a text that is at its position.
+/// The part of a text (start, middle or end) that is at the given position.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Anchor {
     Start,

@@ -21,7 +21,7 @@ pub const UPLOT_LICENCE: &str = include_str!("interactive/uPlot-LICENSE");
 /// The script of linked plots: the class `LinkedAxis` and the function `redrawOn`.
 pub const LINKED: &str =
     concat!(include_str!("interactive/zoom.js"), include_str!("interactive/linked.js"));
-/// The script that opens the elements `details` for paper and for links into them.
+/// The script that opens elements `details` for printing, and when a link leads into one.
 pub const FOLD: &str = include_str!("interactive/fold.js");
 /// How a reader uses linked plots.
 pub const USAGE: [&str; 3] = [

@@ -92,7 +92,7 @@ impl Drop for OpenConnection {
     }
 }
 
-/// Answers the only request of a connection; closes it without an answer if it is broken.
+/// Answers the only request of a connection; closes a broken connection without an answer.
 fn serve(mut stream: TcpStream, site: &Site) {
     let answer = match request::read(&mut stream, Instant::now() + REQUEST_TIME) {
         Ok(request) => site.answer(&request),

@@ -151,7 +151,7 @@ impl Store {
         self.last_request = Some(Instant::now());
     }
 
-    /// Returns whether a page is open: it has sent a request within [`PATIENCE`].
+    /// Returns whether a page is open: one has sent a request within [`PATIENCE`].
     pub(crate) fn is_watched(&self) -> bool {
         self.last_request.is_some_and(|time| time.elapsed() < PATIENCE)
     }

@@ -42,7 +42,7 @@ impl Messages {
     }
 }
 
-/// The page of a run. The server ends when it is dropped.
+/// The page of a run. Dropping it ends the server.
 pub struct View {
     messages: Messages,
     shared: Arc<Shared>,
@@ -143,8 +143,8 @@ impl View {
         self.messages.clone()
     }
 
-    /// Publishes the end of the run and closes the server. If a page is open, waits up to the time `patience`
-    /// until it has received the end.
+    /// Publishes the end of the run and closes the server. If a page is open, waits up to the time `patience` until the
+    /// page has received the end.
     pub fn end(self, outcome: &str, patience: Duration) {
         let outcome = outcome.to_owned();
         // Empties the queue: the server may sleep until the next sample is due.

@@ -10,7 +10,7 @@ use crate::samples::{Collector, Samples};
 use crate::statistics::{SCALE, root};
 use crate::{Error, View};
 
-/// How much a variable differs from that of another run.
+/// The difference of a variable between two runs.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Difference {
@@ -45,9 +45,9 @@ pub struct Comparison {
     pub left_out: usize,
     /// Number of rows of this run that were compared.
     pub rows: u64,
-    /// Number of rows of this run outside of the time of the other one.
+    /// Number of rows of this run before or after the other run.
     pub outside: u64,
-    /// Number of rows of the other run outside of the time of this one; 0 if a range of time was requested.
+    /// Number of rows of the other run before or after this run; 0 if a range of time was requested.
     pub outside_there: u64,
 }
 
@@ -58,8 +58,8 @@ impl Comparison {
         self.differences.iter().all(|difference| difference.largest <= 0.0)
     }
 
-    /// Returns a sentence for each part of the runs that was not compared. `here` and `there` name them; a list has at
-    /// most `limit` names.
+    /// Returns a sentence for each part of the runs that was not compared. `here` and `there` are the names of the two
+    /// runs; a list has at most `limit` names.
     #[must_use]
     pub fn uncompared(&self, here: &str, there: &str, limit: usize) -> Vec<String> {
         let rows =
@@ -102,8 +102,8 @@ pub(crate) struct ComparisonResult {
 /// of `view`. Between rows, the other run is interpolated linearly; integers and Booleans are held. Rows
 /// with the same time, as at events, are compared in their order.
 ///
-/// Also returns the rows for the plot of each group: the columns of this run, then the columns of the other one, with
-/// NaN where it has no value.
+/// Also returns the rows for the plot of each group: the columns of this run, then the columns of the other run, with
+/// NaN where the other run has no value.
 pub(crate) fn compare(
     view: &View<'_>,
     positions: &[usize],

@@ -92,7 +92,7 @@ fn arrow(from: Corner, to: Corner, connections: &[&Connection]) -> Markup {
     }
 }
 
-/// Returns the name of a single connection whose output and input have the same name, otherwise the number of them all.
+/// Returns the label of an arrow: the name that a single connection has at both ends, or the number of connections.
 fn label_of(connections: &[&Connection]) -> String {
     match connections {
         [only] if only.output == only.input => short(&only.output),

@@ -41,7 +41,7 @@ pub struct Request<'a> {
     pub results: &'a Path,
     /// A second results file, from which the first one is subtracted.
     pub against: Option<&'a Path>,
-    /// The variables, by name or pattern; all variables if it is empty.
+    /// The variables to show, by name or pattern; if the list is empty, all variables.
     pub variables: &'a [String],
     /// The first and the last time of the rows that are read, in s; negative and positive infinity stand for the start
     /// and the end of the file.
@@ -67,7 +67,7 @@ pub struct Run {
     pub connections: Vec<Connection>,
     /// The names of the outputs, such as `plant.x_p`.
     pub outputs: Vec<String>,
-    /// The names of connected inputs on which a fault acts: they differ from their sources.
+    /// The names of connected inputs on which a fault acts, so that they differ from their sources.
     pub disturbed: Vec<String>,
     /// The variables whose plot the configuration asks for, by name or pattern.
     pub plotted: Vec<String>,
