@@ -33,7 +33,7 @@ pub extern "C" fn start(step: f64, stop: f64) -> i32 {
     }))
 }
 
-/// Sets an input or a tunable parameter, `fmu.variable=value` in the text buffer; returns 1 if it is refused.
+/// Sets an input or a tunable parameter by `fmu.variable=value` in the text buffer; returns 1 if this is refused.
 #[unsafe(no_mangle)]
 pub extern "C" fn set() -> i32 {
     let text = read();

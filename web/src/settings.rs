@@ -64,7 +64,7 @@ impl Settings {
         Ok(settings)
     }
 
-    /// The faults, each at the connection to its input.
+    /// Returns a scenario with the faults, each on the connection to its input.
     ///
     /// # Errors
     ///
@@ -103,7 +103,7 @@ fn number(line: &str, word: &str) -> Result<f64, String> {
     text::number(word).ok_or_else(|| format!("{line}: expected a number, found {word:?}"))
 }
 
-/// An error and its causes as a sentence.
+/// Formats an error and its causes as a sentence.
 pub(crate) fn told(error: impl std::error::Error) -> String {
     sentence(&error)
 }

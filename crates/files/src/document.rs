@@ -21,7 +21,7 @@ pub struct Source {
 /// A range of bytes in a [`Source`].
 pub type Place = Range<usize>;
 
-/// An error at a place in a file; its text shows the line and underlines the place.
+/// An error at a place in a file. The text of the error shows the line and underlines the place.
 #[derive(Clone, Debug)]
 pub struct PlaceError {
     path: PathBuf,
@@ -117,8 +117,8 @@ impl Source {
         })
     }
 
-    /// Returns an error that points at `place`: if this has several lines, at its first line; if it is beyond the text,
-    /// at the last line.
+    /// Returns an error that points at `place`: at its first line, or at the last line of the text if `place` is beyond
+    /// the text.
     ///
     /// # Panics
     ///

@@ -61,7 +61,7 @@ struct Loader {
     linear: Vec<(String, Linear)>,
 }
 
-/// A linear transformation with the connections to it.
+/// A linear transformation with the connections to its ends.
 #[derive(Default)]
 struct Linear {
     factor: f64,

@@ -243,7 +243,7 @@ pub struct ParameterBinding {
     pub at: Place,
 }
 
-/// Content in the same file or in another one.
+/// Content in the same file or in another file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source<T> {
     /// In this file.

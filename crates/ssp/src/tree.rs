@@ -138,7 +138,7 @@ impl Tree {
         self.description(node).is_some_and(|description| description.version() != Version::V3)
     }
 
-    /// Returns whether a connector is a terminal of an FMU; its connection connects all members of the terminal.
+    /// Returns whether a connector is a terminal of an FMU; a connection to it connects all members of the terminal.
     pub(super) fn is_terminal(&self, vertex: &Vertex) -> bool {
         let terminals =
             self.description(vertex.node).map(|description| description.terminals.iter());
@@ -168,8 +168,8 @@ impl Tree {
         stated.or(declared)
     }
 
-    /// Returns the unit or enumeration that the component outside, whose source is this system, states for the
-    /// connector; `None` if there is no such component or if it does not have the connector.
+    /// Returns the unit or enumeration that the component whose source is this system states for the connector; `None`
+    /// without such a component, or if it lacks the connector.
     pub(super) fn measure_outside(&self, vertex: &Vertex) -> Option<Measure> {
         let (connectors, file) = self.nodes[vertex.node].outside.as_ref()?;
         let connector = connectors.iter().find(|connector| connector.name == vertex.connector)?;

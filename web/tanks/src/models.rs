@@ -4,7 +4,7 @@ use aso_controller::Design;
 
 pub use three_tank::ThreeTank as Plant;
 
-/// The design of `examples/three-tank/detection.toml`, as `aso-ftc design` writes it.
+/// The design that `aso-ftc design` writes for `examples/three-tank/detection.toml`.
 pub fn design() -> Design {
     use aso_controller::Matrix;
     use aso_controller::design::Estimator::Current;

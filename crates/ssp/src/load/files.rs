@@ -1,4 +1,4 @@
-//! Reads files. Each file except those of signal dictionaries is read once even if several elements refer to it.
+//! Reads files. A file to which several elements refer is read once, except a file with a signal dictionary.
 
 use std::collections::HashMap;
 use std::fs;

@@ -52,7 +52,7 @@ pub(super) enum Kind {
     Sum(Sum),
 }
 
-/// A connection of two variables, of a variable and a signal of a function, or of two groups of them.
+/// A connection of two variables, of a variable and a signal of a function, or of two groups of variables or signals.
 #[derive(Debug)]
 pub(super) struct Connection {
     pub(super) ends: [End; 2],
