@@ -1,4 +1,4 @@
-//! An FMU in C that simulates a CAN bus; `tests/c/bus3.c` says what it does.
+//! An FMU in C that simulates a CAN bus, described in `tests/c/bus3.c`.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! FMUs in C that misbehave on request; `tests/c/slave.h` says how.
+//! FMUs in C that misbehave on request, as described in `tests/c/slave.h`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

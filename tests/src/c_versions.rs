@@ -1,4 +1,4 @@
-//! FMUs in C of FMI 3.0 and 1.0: `tests/c/slave3.c` and `tests/c/slave1.c` say what they do.
+//! FMUs in C of FMI 3.0 and 1.0, described in `tests/c/slave3.c` and `tests/c/slave1.c`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -66,8 +66,8 @@ fn version_3(folder: &Path, token: &str, interface: &str, file: &str) -> PathBuf
 /// The files of an FMU, by path.
 type Files = [(&'static str, String)];
 
-/// Builds `source`, a name without extension, and writes it to `folder` as an FMU of FMI 3.0 with this description and
-/// further files.
+/// Writes an FMU of FMI 3.0 with this description and further files to `folder`; builds the C file `source` for it and
+/// takes its name from this file.
 pub(crate) fn fmu_3(
     folder: &Path,
     source: &'static str,

@@ -1,4 +1,4 @@
-//! A model-exchange FMU in C; `tests/c/equations.c` says what it does.
+//! A model-exchange FMU in C, described in `tests/c/equations.c`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -42,7 +42,7 @@ pub fn write(folder: &Path) -> PathBuf {
     write_with(folder, &[])
 }
 
-/// Writes the FMU, built with these definitions.
+/// Writes the FMU to `folder/equations.fmu`, built with these options of the compiler.
 ///
 /// # Panics
 ///

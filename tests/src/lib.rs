@@ -94,7 +94,7 @@ pub fn dist() -> &'static Path {
 ///
 /// # Panics
 ///
-/// If the FMUs refuse.
+/// If an FMU cannot be instantiated or refuses a setting.
 #[must_use]
 pub fn closed_loop(settings: &[(&str, &str)]) -> System {
     closed_loop_of("FrictionPendulum.fmu", "AsoController.fmu", settings)
@@ -104,7 +104,7 @@ pub fn closed_loop(settings: &[(&str, &str)]) -> System {
 ///
 /// # Panics
 ///
-/// If the FMUs refuse.
+/// If an FMU cannot be instantiated or refuses a setting.
 #[must_use]
 pub fn closed_loop_of(plant: &str, controller: &str, settings: &[(&str, &str)]) -> System {
     let mut system = System::default();

@@ -1,4 +1,4 @@
-//! An FMU in C that sends and receives by clocked variables; `tests/c/node3.c` says what it does.
+//! An FMU in C that sends and receives by clocked variables, described in `tests/c/node3.c`.
 
 use std::path::{Path, PathBuf};
 

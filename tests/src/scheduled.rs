@@ -1,4 +1,4 @@
-//! An FMU in C for scheduled execution; `tests/c/scheduled3.c` says what it does.
+//! An FMU in C for scheduled execution, described in `tests/c/scheduled3.c`.
 
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! An FMU in C that misbehaves on request, mostly towards its process.
 //!
-//! Unlike the strict FMUs of [`c_fmu`](crate::c_fmu), it accepts any call at any time: a test sets
-//! between two steps what it does next. It has long strings and a long state.
+//! Unlike the strict FMUs of [`c_fmu`](crate::c_fmu), this FMU accepts any call at any time: a test can select another
+//! misbehaviour between two steps. It has long strings and a long state.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -58,7 +58,7 @@ pub fn troubles() -> &'static Path {
         let description = "modelDescription.xml";
         let copied = std::fs::copy(sources.join(description), folder.join(description));
         copied.unwrap_or_else(|_| panic!("{description} cannot be copied"));
-        // The crashes are intended: the compiler must not replace them.
+        // These options keep the compiler from removing the intended crashes.
         let status = Command::new("cc")
             .args(["-std=c11", "-O1", "-fno-delete-null-pointer-checks", "-Wall", "-Wextra"])
             .args(["-fno-optimize-sibling-calls", "-pthread", "-shared", "-fPIC", "-o"])
