@@ -15,8 +15,8 @@ const SETTLING: f64 = 20.0;
 const CYCLE: f64 = 0.75;
 /// Shortest slide in m that is counted: when the cart creeps to its rest, rounding makes it stick and slip.
 const SLIDE: f64 = 1e-3;
-/// Coulomb friction of the paper in N. An estimate follows the friction if the root mean square of its error is
-/// below a fifth of it.
+/// Coulomb friction of the paper in N. An estimate follows the friction if the root mean square of its error is below
+/// a fifth of this value.
 const LEVEL: f64 = 25.0;
 /// Time in s before and after a transition within which a spike belongs to the transition.
 const NEAR: f64 = 0.01;

@@ -133,7 +133,7 @@ pub(crate) fn position(value: f64) -> u64 {
     value as u64
 }
 
-/// Writes the percentage that is done; it is rounded down, so that 100 % is the end.
+/// Writes the percentage that is done, rounded down so that 100 % appears only at the end.
 fn percent(state: &ProgressState, text: &mut dyn fmt::Write) {
     let percent = 100 * state.pos() / state.len().unwrap_or(1).max(1);
     // Writing to a text does not fail.
@@ -198,8 +198,8 @@ fn sentence(event: &Event<'_>) -> String {
     format!("{word}: {}{time}{category}: {}{others}", plain(&instance), plain(&message))
 }
 
-/// Replaces control characters in a text of an FMU by spaces, so that it is a single line and cannot move the cursor of
-/// a terminal.
+/// Replaces control characters in a text of an FMU by spaces, so that the text is a single line and cannot move the
+/// cursor of a terminal.
 fn plain(text: &str) -> String {
     let text = text.trim_end();
     text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()

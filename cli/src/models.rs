@@ -14,8 +14,8 @@ pub(crate) const FILTER: &str = "KalmanFilter.fmu";
 /// The folder into which FMUs are packed if no other is stated.
 const DIST: &str = "dist";
 
-/// Folders, relative to that of the command, in which it searches the FMUs: in the folder of a release, below the
-/// prefix of an installation, in the Python package.
+/// Folders, relative to the folder of the command, in which FMUs are searched: in a release, below the prefix of an
+/// installation, in the Python package.
 const BESIDE: [&str; 3] = ["fmus", "../share/aso-ftc/fmus", "../fmus"];
 
 /// The crates of [`FMUS`], in the same order.
@@ -41,8 +41,8 @@ fn missing(packed: &Path) -> String {
     format!("there is no {}: {advice}", packed.display())
 }
 
-/// Returns the clone of this project that the current folder is in or, failing that, the one that the
-/// command was built in, which it prints. Returns an error if there is neither.
+/// Returns the clone of this project that contains the current folder; otherwise prints and returns the clone in which
+/// the command was built. Returns an error if there is neither.
 pub(crate) fn clone() -> anyhow::Result<PathBuf> {
     if let Some(root) = clone_upwards()? {
         return Ok(root);

@@ -117,7 +117,7 @@ fn is_fmu(folder: &Path) -> bool {
     manifest.parse().ok().and_then(name).unwrap_or(false)
 }
 
-/// Writes the files into a temporary folder next to `target` and then renames it. Creates the parent folders.
+/// Writes the files into a temporary folder next to `target`, then renames this folder. Creates the parent folders.
 fn write(target: &Path, files: &[(&str, String)]) -> std::io::Result<()> {
     // `components` drops a slash at the end, with which the temporary folder would be inside of the target.
     let target: PathBuf = std::path::absolute(target)?.components().collect();

@@ -1,7 +1,7 @@
 //! Prints to standard output and standard error. If a reader has closed one of them, as `| head` does,
 //! the command continues without output; after another error, as of a full disk, the exit status is not 0.
 //!
-//! The macros replace those of the standard library, which panic in this case. The words `error:` and
+//! The macros replace those of the standard library, which panic after an error. The words `error:` and
 //! `warning:` at the start of a text have the colours of clap's errors, unless the stream is no
 //! terminal or `NO_COLOR` is set; `CLICOLOR_FORCE` asks for colours everywhere.
 
@@ -35,7 +35,7 @@ const WORDS: [(&str, Style); 2] = [
     ("warning:", AnsiColor::Yellow.on_default().bold()),
 ];
 
-/// The first error of standard output or standard error, other than that its reader closed it; [`finish`] takes it.
+/// The first error of standard output or standard error, except one for a closed reader; [`finish`] takes it.
 static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
 
 fn note(done: io::Result<()>) {

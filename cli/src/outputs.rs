@@ -87,8 +87,8 @@ impl Replacement {
         Ok(replacement)
     }
 
-    /// Restores the former file, or removes the new one if there was none; if that fails, returns the end of a sentence
-    /// about it.
+    /// Restores the former file, or removes the new file if there was none. If this fails, returns a clause for the
+    /// error message.
     fn undo(self) -> Option<String> {
         let Self { path, former } = self;
         let undone = match &former {

@@ -134,7 +134,6 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Options of packing.
 struct PackOptions<'a> {
     /// Folder for the FMUs.
     out: &'a Path,
@@ -274,8 +273,8 @@ fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     fs::read(path).with_context(|| format!("cannot read {}", path.display()))
 }
 
-/// Adds the terminals of the author, or one with all inputs and outputs. A terminal with an unknown variable is an
-/// error.
+/// Adds the terminals that the author defined, or a terminal with all inputs and outputs. A terminal with an unknown
+/// variable is an error.
 fn add_terminals(
     package: &mut Package,
     folder: &Path,
@@ -341,8 +340,8 @@ fn add_documentation(
     Ok(())
 }
 
-/// Adds `model.png`, or a picture made from the drawing, if there is one of them; in FMI 3.0 it is the icon (section
-/// 2.5.1.5).
+/// Adds `model.png` or, without this file, a picture made from the drawing, if there is one. In FMI 3.0 the picture is
+/// the icon (section 2.5.1.5).
 fn add_picture(package: &mut Package, folder: &Path, version: Version) -> anyhow::Result<()> {
     let target = if version == Version::V3 { "terminalsAndIcons/icon.png" } else { "model.png" };
     let picture = folder.join("model.png");

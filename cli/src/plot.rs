@@ -29,9 +29,8 @@ struct Curve {
 ///
 /// # Errors
 ///
-/// Returns an error if the extension is another one, if a name is not in the file, if a variable that is
-/// named is a text, if no variable or more than [`CURVES`] are selected, or if a file cannot be read or
-/// written.
+/// Returns an error for any other extension, if a name is not in the file, if a variable selected by name is a text, if
+/// no variable or more than [`CURVES`] are selected, or if a file cannot be read or written.
 pub(crate) fn plot_with_units(
     results: &Path,
     variables: &[String],

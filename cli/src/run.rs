@@ -450,7 +450,7 @@ fn early_end(requested: f64, end: f64) -> String {
     )
 }
 
-/// Returns a path in `folder` relative to it, and another path unchanged.
+/// Returns `path` relative to `folder` if it is in this folder, otherwise unchanged.
 fn relative(path: &Path, folder: &Path) -> String {
     path.strip_prefix(folder).unwrap_or(path).display().to_string()
 }

@@ -3,7 +3,7 @@ use super::*;
 /// Columns of a terminal.
 const COLUMNS: usize = 80;
 
-/// The command and its verbs as they are on a terminal.
+/// The command, then its verbs, with help texts for a terminal of this width.
 fn commands() -> Vec<clap::Command> {
     let mut command = Arguments::command().term_width(COLUMNS);
     command.build();

@@ -18,8 +18,8 @@ use super::values::{Value, distance, get, outputs, start, start_variables, unkno
 const STEPS: u32 = 10;
 /// Largest number of outputs, of inputs and of start values that are read.
 const VARIABLES: usize = 1000;
-/// Up to this relative difference, other outputs after a state is restored are a warning, not an error: a solver that
-/// restarts causes them.
+/// Largest relative difference of the outputs after a state is restored that is only a warning: a solver that restarts
+/// causes such differences.
 const ROUNDING: f64 = 1e-6;
 
 /// Number of messages of all instances of a trial above which their number is a finding.
@@ -428,7 +428,7 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Checks that an FMU with saved states gives the same outputs after it restored one, directly or from bytes.
+    /// Checks that an FMU that can save states repeats its outputs after a state is restored, directly or from bytes.
     fn check_states(&mut self) {
         let Some(flags) = &self.description.co_simulation else { return };
         if !flags.can_get_and_set_fmu_state {

@@ -122,7 +122,7 @@ fn required(version: Version, interfaces: &[InterfaceType], identifier: &str) ->
     }
 }
 
-/// Returns the platform, whose importers an error stops; nothing for missing functions, warnings and notes.
+/// Returns the platform if the finding is an error, which stops all importers there, other than missing functions.
 fn stops_platform(finding: &Finding, platform: &Platform) -> Vec<Tool> {
     if finding.severity == Error && !finding.what.starts_with("lacks ") {
         return vec![Tool::Platform(platform.folder)];
@@ -177,8 +177,8 @@ fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -
     }
 }
 
-/// Returns each library: the interface types that it serves, and its name. The types omit Scheduled Execution, which
-/// only FMI 3.0 has: there a library exports all functions for any type.
+/// Returns each library: the interface types that it serves, and its name. Omits the type Scheduled Execution, since in
+/// FMI 3.0 a library exports the same functions for all types.
 fn interfaces(description: &ModelDescription) -> Vec<(Vec<InterfaceType>, String)> {
     use InterfaceType::{CoSimulation, ModelExchange};
     let exchange = description.model_exchange.as_ref().map(|flags| flags.model_identifier.clone());

@@ -76,7 +76,7 @@ pub(crate) fn summarise(report: &Report) {
     println!("verdict: {}", report.verdict.level.word());
     // Checks that fail are printed above.
     let is_new = |reason: &&String| !reason.starts_with("does not hold: ");
-    // One change may remove several reasons.
+    // Consecutive reasons may have the same remedy, which is printed once.
     let mut stated = "";
     for reason in report.verdict.reasons.iter().filter(is_new) {
         println!("    {reason}");

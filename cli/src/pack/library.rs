@@ -307,8 +307,8 @@ fn dependencies(metadata: &Metadata, root: &Package, artifacts: &[Artifact]) -> 
         .collect()
 }
 
-/// Returns the direct and indirect dependencies of `root`, without procedural macros and those of build scripts and
-/// tests.
+/// Returns the direct and indirect dependencies of `root`, without procedural macros and without dependencies of build
+/// scripts and tests.
 fn normal_dependencies<'a>(metadata: &'a Metadata, root: &Package) -> Vec<&'a Package> {
     let nodes = metadata.resolve.iter().flat_map(|resolve| &resolve.nodes);
     let nodes: Vec<_> = nodes.collect();

@@ -23,8 +23,7 @@ const TOGETHER: Duration = Duration::from_millis(200);
 static LISTENING: AtomicBool = AtomicBool::new(false);
 /// The number of the first signal that has arrived; 0: none.
 static RAISED: AtomicU8 = AtomicU8::new(0);
-/// Whether the steps have ended.
-static NOTICED: AtomicBool = AtomicBool::new(false);
+static STEPS_ENDED: AtomicBool = AtomicBool::new(false);
 /// The thread of [`wait`].
 static WAITING: OnceLock<Thread> = OnceLock::new();
 
@@ -79,7 +78,7 @@ fn wait() {
         } else if since.elapsed() >= CALL {
             crash::give_up(Some(CALL));
         }
-        if start.elapsed() > STEP && !NOTICED.load(Ordering::Relaxed) {
+        if start.elapsed() > STEP && !STEPS_ENDED.load(Ordering::Relaxed) {
             crash::give_up(None);
         }
         thread::sleep(LOOK);
@@ -94,5 +93,5 @@ pub(super) fn is_raised() -> bool {
 
 /// Records that the steps have ended and only the final work remains.
 pub(super) fn notice() {
-    NOTICED.store(true, Ordering::Relaxed);
+    STEPS_ENDED.store(true, Ordering::Relaxed);
 }

@@ -24,7 +24,7 @@ const SIGNALS: usize = 500;
 const SETTINGS: usize = 5000;
 /// Interval between checks for a signal of the operating system while the run is paused.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest time that the command waits at its end until an open page has shown the end.
+/// Longest time that the command waits at its end for an open page to show it.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// State of the run at its start, as `--live` gives it.

@@ -330,7 +330,7 @@ pub(crate) fn split_names(lists: &[String]) -> Vec<String> {
     names.into_iter().map(str::to_owned).collect()
 }
 
-/// Splits `from=to`; the error for another sign between them proposes the right form.
+/// Splits `from=to`; the error for another sign between the names proposes the right form.
 fn connection(text: &str) -> Result<(String, String), String> {
     let split =
         |sign| text.split_once(sign).filter(|(from, to)| !from.is_empty() && !to.is_empty());
