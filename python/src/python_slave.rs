@@ -36,9 +36,9 @@ pub(crate) struct PythonSlave {
 
 impl PythonSlave {
     /// Creates a slave from `object`. Its attributes `inputs` and `outputs` are names, or a mapping of names to start
-    /// values (`float`, `int` or `bool`, also of `NumPy`); a variable without a start value is a `float` and starts at
-    /// 0. The attribute `direct` (default true) says whether outputs depend on the inputs of the same time. With
-    /// functions `save` and `restore` the slave can save its state.
+    /// values (`float`, `int` or `bool`, also of `NumPy`); without a start value, a variable is a `float` from 0.
+    /// The attribute `direct` (default true) says whether outputs depend on the inputs of the same time. With functions
+    /// `save` and `restore` the slave can save its state.
     ///
     /// # Errors
     ///
