@@ -36,7 +36,7 @@ pub(crate) struct PythonSlave {
 
 impl PythonSlave {
     /// Creates a slave from `object`. Its attributes `inputs` and `outputs` are names, or a mapping of names to start
-    /// values (`float`, `int` or `bool`, also of `NumPy`); without a start value, a variable is a `float` from 0.
+    /// values (`float`, `int` or `bool`, also of `NumPy`); without a start value, a variable is the `float` 0.
     /// The attribute `direct` (default true) says whether outputs depend on the inputs of the same time. With functions
     /// `save` and `restore` the slave can save its state.
     ///
