@@ -95,7 +95,7 @@ pub(super) fn balanced_norm(m: &DMatrix<Complex<f64>>) -> Result<f64, Error> {
 fn balancing_exponents(m: &DMatrix<Complex<f64>>) -> DVector<f64> {
     let k = m.nrows();
     let mut exponents = DVector::<f64>::zeros(k);
-    let largest = m.diagonal().iter().map(|entry| entry.norm_sqr()).fold(0.0, f64::max);
+    let largest = m.diagonal().iter().map(Complex::norm_sqr).fold(0.0, f64::max);
     // Without this least size, coupling in one direction only would not be scaled.
     let least = NEGLIGIBLE * NEGLIGIBLE * largest;
     for _ in 0..BALANCINGS {
