@@ -92,10 +92,10 @@ fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Co
 
 /// Returns the path of an FMU with the content of the FMU at `path` and a library for this platform.
 ///
-/// If the FMU has the libraries of its interfaces for this platform, returns `path`. Otherwise builds them from the
-/// folder `sources`, as `buildDescription.xml` or, in FMI 2.0, the elements `SourceFiles` state, with the compiler in
-/// the variable `CC` (C++: `CXX`) or the first common one that runs. The built FMU is stored in the user's cache
-/// folder and used again for the same content and compiler.
+/// If the FMU has the libraries of its interfaces for this platform, returns `path`. Otherwise builds the missing ones
+/// from the folder `sources`, as `buildDescription.xml` or, in FMI 2.0, the elements `SourceFiles` state, with the
+/// compiler in the variable `CC` (C++: `CXX`) or the first common one that runs. The built FMU is stored in the user's
+/// cache folder and used again for the same content and compiler.
 ///
 /// # Errors
 ///
@@ -115,7 +115,7 @@ pub fn compile(path: &Path) -> Result<PathBuf, CompileError> {
     if !target.is_file() {
         let mut package = content(&unpacked)?;
         let platform = platforms_of(unpacked.description.version()).first().copied();
-        for identifier in &identifiers {
+        for identifier in identifiers.iter().filter(|name| unpacked.library(name).is_err()) {
             let library = build.library(identifier)?;
             let name = format!("{identifier}{}", std::env::consts::DLL_SUFFIX);
             package.add(format!("binaries/{}/{name}", platform.unwrap_or_default()), library);

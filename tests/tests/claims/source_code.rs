@@ -7,7 +7,7 @@ use std::os::unix::ffi::OsStrExt as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use fmu_description::package::{Package, Unpacked};
+use fmu_description::package::{Package, Unpacked, platforms_of};
 use tests::c_fmu::CFmu;
 
 /// Runs the command in `folder`, with a cache in it.
@@ -116,6 +116,25 @@ fn an_fmu_of_a_system_structure_is_built_too() {
     assert!(said(&refused).contains("--compile"), "{}", said(&refused));
     let done = run(folder.path(), "cc", &[&words[..], &["--compile"]].concat());
     assert!(done.status.success(), "{}", said(&done));
+}
+
+/// The FMU has the library for model exchange, beside one that this library could load, and none for co-simulation.
+#[test]
+fn an_fmu_with_the_library_of_one_interface_gets_that_of_the_other_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = CFmu::well_behaved().in_source().write(folder.path(), "slave");
+    let unpacked = Unpacked::open_whole(&path).unwrap();
+    let xml = std::fs::read_to_string(unpacked.folder().join("modelDescription.xml")).unwrap();
+    let both = "<ModelExchange modelIdentifier=\"other\"/>\n<CoSimulation";
+    let mut package = Package::new(xml.replace("<CoSimulation", both));
+    package.add_folder("sources", &unpacked.folder().join("sources")).unwrap();
+    let platform = platforms_of(unpacked.description.version())[0];
+    for name in ["other.so", "libneeded.so"] {
+        package.add(format!("binaries/{platform}/{name}"), "not loaded here");
+    }
+    package.write(&path).unwrap();
+    let output = run(folder.path(), "cc", &[&RUN[..], &["--compile"]].concat());
+    assert!(output.status.success(), "{}", said(&output));
 }
 
 #[test]
