@@ -155,8 +155,8 @@ fn top_level(names: &[String], version: Version, findings: &mut Findings) {
         let reserved = ["org.modelica", "org.fmi-standard"];
         let inner = name.strip_prefix("extra/").and_then(|rest| rest.split('/').next());
         let Some(inner) = inner.filter(|inner| !inner.is_empty()) else { continue };
-        // Layered standards of FMI 3.0 (section 2.6).
-        if version == Version::V3 && inner.starts_with("org.fmi-standard.fmi-ls-") {
+        // Layered standards of the FMI project, some of which also apply to FMI 2.0.
+        if inner.starts_with("org.fmi-standard.fmi-ls-") {
             continue;
         }
         if reserved.iter().any(|prefix| inner.starts_with(prefix)) || !inner.contains('.') {
@@ -273,5 +273,21 @@ mod tests {
         };
         assert_eq!(count(&["modelDescription.xml", "binaries/", "binaries/linux64/"]), 1);
         assert_eq!(count(&["modelDescription.xml", "binaries/", "binaries/linux64/m.so"]), 0);
+    }
+
+    /// FMI-LS-REF is based on FMI 2.0 and 3.0; FMI 2.0.5, section 2.3.1, reserves the prefix for layered standards.
+    #[test]
+    fn the_files_of_a_layered_standard_are_in_its_folder_in_fmi_2_and_3() {
+        for version in [Version::V2, Version::V3] {
+            for (folder, expected) in
+                [("org.fmi-standard.fmi-ls-ref", 0), ("org.fmi-standard", 1), ("mine", 1)]
+            {
+                let names =
+                    ["binaries/l/m.so".to_owned(), format!("extra/{folder}/fmi-ls-manifest.xml")];
+                let mut findings = Findings::about(Part::Archive);
+                top_level(&names, version, &mut findings);
+                assert_eq!(findings.all.len(), expected, "{:#?}", findings.all);
+            }
+        }
     }
 }
