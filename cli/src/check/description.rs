@@ -103,7 +103,9 @@ fn notes(description: &ModelDescription, findings: &mut Findings) {
     };
     let experiment = description.default_experiment.unwrap_or_default();
     let stated = [("stopTime", experiment.stop_time), ("stepSize", experiment.step_size)];
-    let absent = stated.iter().filter(|(_, value)| value.is_none());
+    // FMI 1.0 has no stepSize.
+    let count = if description.version() == Version::V1 { 1 } else { 2 };
+    let absent = stated.iter().take(count).filter(|(_, value)| value.is_none());
     let absent: Vec<_> = absent.map(|(name, _)| *name).collect();
     if !absent.is_empty() {
         let what = format!("no {} in DefaultExperiment", absent.join(" and no "));

@@ -6,8 +6,8 @@ use fmu_description::abi::Status;
 use master::{CallError, Failure, Slave, StepResult};
 
 use super::answer::{Answer, TrialResult};
-use super::behaviour;
 use super::finding::{Finding, Severity};
+use super::{behaviour, description};
 
 const XML: &str = r#"<fmiModelDescription fmiVersion="2.0" modelName="Sum" guid="g">
 <CoSimulation modelIdentifier="Sum" canGetAndSetFMUstate="true" canSerializeFMUstate="true"/>
@@ -277,6 +277,23 @@ fn a_crash_in_the_freeing_of_the_former_instance_is_one_after_its_end() {
     let freed = all.iter().find(|finding| finding.place == "fmi3FreeInstance").unwrap();
     assert!(freed.what.ends_with("after fmi2Terminate"), "{freed}");
     assert_eq!(freed.section, Some("4.2.4"));
+}
+
+/// `DefaultExperiment` has a `stepSize` since FMI 2.0.
+#[test]
+fn a_missing_step_size_is_a_note_except_in_fmi_1() {
+    let xml_1 = r#"<fmiModelDescription fmiVersion="1.0" modelName="S" modelIdentifier="S" guid="g"
+numberOfContinuousStates="0" numberOfEventIndicators="0"></fmiModelDescription>"#;
+    let xml_2 = XML.replace(r#" stopTime="1" tolerance="1e-5" stepSize="0.125""#, "");
+    for (xml, expected) in [
+        (xml_1, "no stopTime in DefaultExperiment"),
+        (xml_2.as_str(), "no stopTime and no stepSize in DefaultExperiment"),
+    ] {
+        let description = ModelDescription::parse(xml).unwrap();
+        let all = description::check(&description, &[]);
+        let notes = all.iter().filter(|finding| finding.what.ends_with("in DefaultExperiment"));
+        assert_eq!(notes.map(|finding| finding.what.as_str()).collect::<Vec<_>>(), [expected]);
+    }
 }
 
 #[test]
