@@ -55,9 +55,10 @@ fn describe<'py>(py: Python<'py>, fmu: &ModelDescription) -> PyResult<Bound<'py,
     interfaces.extend(fmu.model_exchange.as_ref().map(|_| "model-exchange"));
     interfaces.extend(fmu.scheduled_execution.as_ref().map(|_| "scheduled-execution"));
     description.set_item("interfaces", interfaces)?;
-    let identifier = fmu.co_simulation.as_ref().map(|flags| &flags.model_identifier);
-    let identifier =
-        identifier.or(fmu.model_exchange.as_ref().map(|flags| &flags.model_identifier));
+    let co_simulation = fmu.co_simulation.as_ref().map(|flags| &flags.model_identifier);
+    let model_exchange = fmu.model_exchange.as_ref().map(|flags| &flags.model_identifier);
+    let scheduled = fmu.scheduled_execution.as_ref().map(|flags| &flags.model_identifier);
+    let identifier = co_simulation.or(model_exchange).or(scheduled);
     description.set_item("model_identifier", identifier)?;
     description.set_item("capabilities", capabilities(py, fmu)?)?;
     let experiment = fmu.default_experiment.unwrap_or_default();

@@ -36,6 +36,18 @@ def test_the_description_is_that_of_fmpy():
         assert description[description.variables[3].name] is description.variables[3]
 
 
+def test_the_identifier_of_scheduled_execution_alone_is_known(tmp_path):
+    (tmp_path / "modelDescription.xml").write_text("""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="Tasks" instantiationToken="t">
+<ScheduledExecution modelIdentifier="tasks_3"/>
+<ModelVariables><Clock name="tick" valueReference="1" causality="input" intervalVariability="triggered"/></ModelVariables>
+<ModelStructure/>
+</fmiModelDescription>
+""")
+    description = af.read_model_description(tmp_path)
+    assert (description.interfaces, description.model_identifier) == (("scheduled-execution",), "tasks_3")
+
+
 def columns(result):
     return {name: result[name] for name in result.dtype.names}
 
