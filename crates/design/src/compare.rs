@@ -21,7 +21,8 @@ use plant_file::estimation::Law;
 /// Designs the controller of the plant file at `path` with each law.
 ///
 /// The law that the file names has the parameters of the file, the others have default parameters. A law that does not
-/// exist for the plant has a reason in place of a result. Certificates and bounds are left out.
+/// exist for the plant, or that another table of the file excludes, has a reason in place of a result. Certificates and
+/// bounds are left out.
 ///
 /// # Errors
 ///
@@ -39,8 +40,8 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
         let stated = file.estimation.law.name() == law.name();
         let law = if stated { file.estimation.law.clone() } else { law };
         let mut reason = problem.design(&law).err();
-        if file.schedule.is_some() && !law.allows("schedule") {
-            reason = Some("it is not possible with a schedule".to_owned());
+        if let Some(table) = file.excluding(&law) {
+            reason = Some(format!("it is not possible with `{table}`"));
         }
         let mut result = None;
         if reason.is_none() {

@@ -808,6 +808,23 @@ fn without_time_for_certificates_the_report_says_what_is_left_out() {
     }
 }
 
+/// The reader of plant files refuses a law that another table excludes.
+#[test]
+fn a_comparison_has_results_only_of_laws_that_the_plant_file_may_name() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/plant-file");
+    for name in ["family.toml", "reconfiguration.toml"] {
+        let path = folder.join(name);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut laws = crate::compare(&path).unwrap().laws;
+        laws.retain(|law| law.result.is_some());
+        assert!(!laws.is_empty(), "{name}");
+        for law in laws {
+            let stated = format!("{text}\n[estimation]\nlaw = \"{}\"\n", law.law);
+            read(&stated, |_| ()).expect(name);
+        }
+    }
+}
+
 /// `BLESS=1 cargo test -p aso-design --lib schema` writes the file.
 #[test]
 fn the_schema_in_the_book_is_that_of_the_report() {

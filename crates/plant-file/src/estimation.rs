@@ -3,6 +3,10 @@
 use crate::read::{Result, each, not_negative, optional, positive, positive_within};
 use files::{Entry, Place, Table};
 
+/// The tables of a plant file that exclude some laws.
+pub(crate) const EXCLUDING: [&str; 5] =
+    ["loop", "family", "schedule", "reconfiguration", "fallback"];
+
 /// A law that estimates the faults; parameters that the file does not state are `None`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
@@ -122,7 +126,7 @@ impl Law {
         }
     }
 
-    /// Whether a plant file with this law may have the table `key`: family, schedule, reconfiguration or fallback.
+    /// Whether a plant file with this law may have `key`: loop, family, schedule, reconfiguration or fallback.
     #[must_use]
     pub fn allows(&self, key: &str) -> bool {
         match self {
@@ -151,7 +155,7 @@ impl EstimationRequest {
             let message = format!("expected one of {}, found {text:?}", names.join(", "));
             return Err(stated.error(message));
         };
-        for key in ["family", "schedule", "reconfiguration", "fallback"] {
+        for key in EXCLUDING {
             if !law.allows(key) && file.get(key).is_some() {
                 let all = Law::ALL.iter().filter(|law| law.allows(key)).map(Law::name);
                 let all = all.collect::<Vec<_>>().join(", ");

@@ -26,7 +26,7 @@ use std::path::Path;
 
 use crate::channel::ChannelSignals;
 use crate::detection::{DetectionRequest, Disturbance, disturbances};
-use crate::estimation::EstimationRequest;
+use crate::estimation::{EXCLUDING, EstimationRequest, Law};
 use crate::fallback::FallbackRequest;
 use crate::faults::{EntryPoint, Fault, all_faults};
 use crate::loop_shape::LoopShape;
@@ -298,6 +298,12 @@ impl<'a> PlantFile<'a> {
     /// Returns an error at `place`.
     pub fn error_at(&self, place: &Place, message: impl Into<String>) -> PlaceError {
         self.source.error(place, message)
+    }
+
+    /// Returns a table of the file that excludes `law`; `None` if there is none.
+    #[must_use]
+    pub fn excluding(&self, law: &Law) -> Option<&'static str> {
+        EXCLUDING.into_iter().find(|key| self.places.contains_key(key) && !law.allows(key))
     }
 
     /// Whether a measurement has a `range` or a `longest_hold`.
