@@ -41,13 +41,14 @@ impl Collector {
     }
 
     pub(crate) fn push(&mut self, time: f64, values: impl Iterator<Item = f64>) {
+        // A full block waits for the next row, because it may be the last block of the run.
+        if self.length > 1 && self.block.time.len() == self.length {
+            self.reduce();
+        }
         let samples = if self.length > 1 { &mut self.block } else { &mut self.samples };
         samples.time.push(time);
         samples.columns.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
         self.samples.total += 1;
-        if self.length > 1 && self.block.time.len() == self.length {
-            self.reduce();
-        }
     }
 
     pub(crate) fn finish(mut self) -> Samples {
@@ -130,6 +131,15 @@ mod tests {
         }
         let at = samples.time.partition_point(|time| *time < 345.0);
         assert_eq!((samples.columns[0][at], samples.columns[1][at]), (9.0, 34.5_f64.sin()));
+    }
+
+    #[test]
+    fn the_last_row_of_a_run_remains_if_it_ends_with_a_full_block() {
+        let mut collector = Collector::new(1, 100, false);
+        (0_u32..1000).map(|row| 0.1 * f64::from(row)).for_each(|time| {
+            collector.push(time, [time.sin()].into_iter());
+        });
+        assert_eq!(collector.finish().time.last(), Some(&(0.1 * 999.0)));
     }
 
     #[test]
