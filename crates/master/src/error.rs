@@ -175,8 +175,10 @@ pub enum SystemError {
         seconds(*time)
     )]
     Unreadable {
+        /// The slave.
+        slave: Box<str>,
         /// The variable, as `slave.variable`.
-        name: String,
+        name: Box<str>,
         /// Time of the master in s.
         time: f64,
         /// Function, status and messages.

@@ -244,8 +244,9 @@ impl Readout {
             for &port in members.collect::<Vec<_>>() {
                 match system.get_value(port) {
                     Err(source) if source.ends_the_instance() => {
-                        let name = system.name(port);
-                        return Err(SystemError::Unreadable { name, time, source });
+                        let slave = system.slaves[slave].0.as_str().into();
+                        let name = system.name(port).into();
+                        return Err(SystemError::Unreadable { slave, name, time, source });
                     }
                     Err(error) => refused.push((port, error)),
                     Ok(_) => {}

@@ -8,7 +8,7 @@ use fmu_description::abi::Status;
 use fmu_import::{Fmu, FmuError, Instance, LoadError};
 use linearise::{Differences, Method};
 use linearise::{Linearise, linearise};
-use master::{CallError, Failure, Slave, StepResult};
+use master::{CallError, Failure, Readout, Slave, StepResult, System, SystemError};
 use tempfile::TempDir;
 use tests::c_fmu::CFmu;
 
@@ -55,6 +55,20 @@ fn output(slave: &mut Instance) -> f64 {
     let mut values = [f64::NAN];
     slave.get_real(&[Y], &mut values).unwrap();
     values[0]
+}
+
+/// The name of the FMU has a dot, so that it cannot be found in the name of the variable.
+#[test]
+fn the_error_of_a_variable_that_cannot_be_read_names_its_fmu() {
+    let mut slave = instance(&CFmu::well_behaved().with_unreadable_variable());
+    initialise(&mut slave).unwrap();
+    let mut system = System::default();
+    system.add("car.engine", Box::new(slave)).unwrap();
+    let ports = [system.port("car.engine.hidden").unwrap()];
+    let mut readout = Readout::new(&system, &ports);
+    let error = readout.unreadable(&mut system, &ports, 0.0).unwrap_err();
+    let SystemError::Unreadable { slave, name, .. } = &error else { panic!("{error}") };
+    assert_eq!((&**slave, &**name), ("car.engine", "car.engine.hidden"));
 }
 
 #[test]
