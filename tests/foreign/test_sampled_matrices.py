@@ -77,6 +77,14 @@ def test_matlab_variables_with_a_sample_time_become_a_sampled_plant(aso_ftc, tmp
     np.testing.assert_array_equal(plant["A"], SAMPLED)
 
 
+def test_the_plant_file_of_a_sampled_plant_with_feedthrough_names_d(aso_ftc, tmp_path):
+    savemat(tmp_path / "plant.mat", {"A": [[0.9]], "B": [[0.1]], "C": [[1.0]], "D": [[0.5]], "Ts": 0.1})
+    done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")
+    text = (tmp_path / "plant.toml").read_text(encoding="utf-8")
+    assert tomllib.loads(text)["D"] == [[0.5]], done.stderr
+    assert "# x[k+1] = A x[k] + B u[k], y = C x + D u, in deviations from the operating point.\n" in text
+
+
 SCALAR = 'B = [[1]]\nC = [[1]]\nactuator_faults = "all"\n'
 
 

@@ -135,7 +135,7 @@ impl Draft {
         match &self.model {
             Model::Matrices { a, b, c, d, states, sampled } => {
                 if let Some(period) = sampled {
-                    *text += "# x[k+1] = A x[k] + B u[k], y[k] = C x[k], in deviations from the operating point.\n\
+                    *text += "# x[k+1] = A x[k] + B u[k], y = C x + D u, in deviations from the operating point.\n\
                               matrices = \"sampled\"\n";
                     line(text, "sample_time", *period);
                 } else {
