@@ -206,6 +206,14 @@ def test_measurements_that_cannot_tell_all_faults_apart_get_fewer(aso_ftc, tmp_p
     assert file["actuator_faults"] == ["u1"]
 
 
+@pytest.mark.parametrize("stated, expected", [(0.0, None), ([0.0, 0.5], [[0.0], [0.5]])])
+def test_matlab_variables_state_zeros_of_any_size_or_an_array_of_one_dimension_as_d(aso_ftc, tmp_path, stated, expected):
+    savemat(tmp_path / "plant.mat", {"A": [[-0.5]], "B": [[0.5]], "C": [[1.0], [-0.5]], "D": stated})
+    done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")
+    assert done.returncode == 0, done.stderr
+    assert tomllib.loads((tmp_path / "plant.toml").read_text(encoding="utf-8")).get("D") == expected
+
+
 def test_a_plant_with_feedthrough_gets_a_filter(aso_ftc, tmp_path):
     savemat(tmp_path / "plant.mat", {"A": [[-0.5]], "B": [[0.5]], "C": [[1.0], [-0.5]], "D": [[0.0], [0.5]]})
     done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")

@@ -49,8 +49,13 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
     if c.shape() == (a.nrows(), 1) {
         c = c.transpose();
     }
-    let d = matrix("D")?.unwrap_or_else(|| DMatrix::zeros(c.nrows(), b.ncols()));
     let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
+    // As in `ss` of MATLAB, a D of zeros may have any size.
+    let stated = matrix("D")?.filter(|d| d.iter().any(|&entry| entry != 0.0));
+    let mut d = stated.unwrap_or_else(|| DMatrix::zeros(p, m));
+    if m.min(p) == 1 && d.shape() == (m, p) {
+        d = d.transpose();
+    }
     for (name, matrix, expected) in
         [("A", &a, (n, n)), ("B", &b, (n, m)), ("C", &c, (p, n)), ("D", &d, (p, m))]
     {
