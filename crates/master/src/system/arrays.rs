@@ -82,10 +82,9 @@ impl System {
             Named::Array(_) => None,
         };
         let pairs = match (&source, &target) {
-            (Named::One(_), _) | (_, Named::One(_)) => {
-                only(&source).zip(only(&target)).map(|pair| vec![pair])
-            }
-            (Named::Array(sources), Named::Array(targets)) if sources.len() == targets.len() => {
+            (Named::Array(sources), Named::Array(targets))
+                if sources.len() == targets.len() && sources.len() > 1 =>
+            {
                 let partner = |indices: &String| {
                     let target = targets.iter().find(|(other, _)| other == indices);
                     target.map(|(_, port)| *port)
@@ -97,7 +96,7 @@ impl System {
                 };
                 sources.iter().enumerate().map(pair).collect()
             }
-            _ => None,
+            _ => only(&source).zip(only(&target)).map(|pair| vec![pair]),
         };
         pairs.ok_or_else(|| SystemError::Size {
             from: from.to_owned(),

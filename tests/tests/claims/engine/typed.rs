@@ -87,6 +87,23 @@ fn a_structural_parameter_that_is_a_real_is_refused_and_not_set_to_zero() {
     assert_eq!(message, expected);
 }
 
+/// The indices differ: `y[1]` is a vector, `u[1,1]` a matrix, and other tools count from 0.
+#[test]
+fn two_arrays_of_one_element_are_connected_as_scalars() {
+    let variables = r#"<Float64 name="y[1]" valueReference="1" causality="output"/>
+        <Float64 name="u[1,1]" valueReference="2" causality="input" start="0"/>
+        <Float64 name="v[0]" valueReference="3" causality="input" start="0"/>"#;
+    let mut system = System::default();
+    for name in ["a", "b"] {
+        system.add(name, of_fmi_3(variables)).unwrap();
+    }
+    let output = system.port("a.y[1]").unwrap();
+    for (array, element) in [("b.u", "b.u[1,1]"), ("b.v", "b.v[0]")] {
+        let input = system.port(element).unwrap();
+        assert_eq!(system.pairs("a.y", array).unwrap(), [(output, input)]);
+    }
+}
+
 #[test]
 fn two_chains_of_faults_of_one_input_are_refused() {
     let system = ring();
