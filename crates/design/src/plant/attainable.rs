@@ -54,7 +54,8 @@ pub(crate) fn warnings(
                 "no controller has a peak of S below {}: the unstable eigenvalues of the plant grow too much in a sample; \
                  expected at most {} s",
                 rounded(least),
-                rounded(limit.ln() / rate)
+                // Within the limit after rounding to five digits.
+                rounded(0.9999 * limit.ln() / rate)
             );
             let warning = file.error(&["sample_time"], message);
             if least > NO_LOOP {
@@ -175,6 +176,24 @@ fn is_right(value: Complex<f64>) -> bool {
 mod tests {
     use super::*;
     use crate::tests::read;
+
+    /// With a rate of 1 1/s the peak is at most 2 up to ln 2 = 0.693147 s, which rounds up to 0.69315 s.
+    #[test]
+    fn the_advised_sample_time_is_within_the_limit() {
+        let warned = |period: &str| {
+            let text = format!(
+                "A = [[1]]\nB = [[1]]\nC = [[1]]\nsample_time = {period}\nactuator_faults = \"all\"\n\
+                 feedback.sampled_eigenvalues = [0.5]\n"
+            );
+            let all = |file: &PlantFile<'_>| warnings(file, &LinearPlant::of(file).unwrap());
+            let all = read(&text, all).unwrap().unwrap();
+            all.first().map(|warning| warning.message().to_owned())
+        };
+        let advice = warned("1").unwrap();
+        let (_, time) = advice.rsplit_once("expected at most ").unwrap();
+        assert_eq!(warned(time.strip_suffix(" s").unwrap()), None, "{advice}");
+        assert!(warned("0.6932").is_some());
+    }
 
     /// The plant (1 - s) / (1 + s)^2. A modulus of 0.5 in 0.1 s is 6.9 rad/s, which the zero at 1 1/s does not allow.
     #[test]
