@@ -3,7 +3,6 @@
 use super::francis;
 use crate::balance::Balance;
 use crate::blocks::block_2x2;
-use crate::check::as_number;
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// A Hamiltonian matrix [A, G; Q, -A'] with symmetric G and Q.
@@ -16,18 +15,17 @@ pub(crate) struct Hamiltonian {
 impl Hamiltonian {
     /// Creates the matrix from its blocks, n x n each, with balanced states and costates.
     ///
-    /// The states are scaled by the diagonal D, the costates by c D^-1, which keeps the matrix Hamiltonian and changes
-    /// no eigenvalue; D and c follow from the scales that balance the whole matrix.
+    /// The states are scaled by the diagonal D, the costates by D^-1, which keeps the matrix Hamiltonian and changes no
+    /// eigenvalue. D^2 is the ratio of the scales of state and costate that balance the whole matrix: a factor that all
+    /// scales have in common changes no entry.
     pub(crate) fn balanced(a: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) -> Self {
         let n = a.nrows();
         let scale = Balance::new(&block_2x2([a, g], [q, &-a.transpose()])).scale;
         let unit = DVector::from_fn(n, |i, _| (scale[i] / scale[n + i]).sqrt());
-        let logarithms = scale.iter().map(|one| one.ln()).sum::<f64>();
-        let ratio = (logarithms * 2.0 / as_number(2 * n)).exp();
         Self {
             a: DMatrix::from_fn(n, n, |i, j| a[(i, j)] * (unit[j] / unit[i])),
-            g: DMatrix::from_fn(n, n, |i, j| g[(i, j)] * ratio / unit[i] / unit[j]),
-            q: DMatrix::from_fn(n, n, |i, j| q[(i, j)] / ratio * unit[i] * unit[j]),
+            g: DMatrix::from_fn(n, n, |i, j| g[(i, j)] / unit[i] / unit[j]),
+            q: DMatrix::from_fn(n, n, |i, j| q[(i, j)] * unit[i] * unit[j]),
         }
     }
 
@@ -172,5 +170,23 @@ pub(super) mod tests {
                 assert!(error < 1e-12 * norm * norm / value.norm(), "{n}: {value} {error}");
             }
         }
+    }
+
+    /// A change of the unit of all states, by 2^20, multiplies G by 2^40 and Q by 2^-40.
+    #[test]
+    fn the_balanced_norm_does_not_depend_on_the_unit_of_the_states() {
+        let n = 7;
+        let norm = |unit: f64| {
+            let mut random = random(1.0);
+            let a = DMatrix::from_fn(n, n, |_, _| random());
+            let mut symmetric = || {
+                let half = DMatrix::from_fn(n, n, |_, _| random());
+                &half + half.transpose()
+            };
+            let (g, q) = (symmetric() * (unit * unit), symmetric() / (unit * unit));
+            Hamiltonian::balanced(&a, &g, &q).norm()
+        };
+        let (one, large, small) = (norm(1.0), norm(2.0_f64.powi(20)), norm(2.0_f64.powi(-20)));
+        assert!(large < 2.0 * one && small < 2.0 * one, "{one} {large} {small}");
     }
 }
