@@ -82,8 +82,12 @@ pub(crate) fn warnings(
     if b.ncols() == 1 && c.nrows() == 1 && d.amax() <= 0.0 && linear.domain == Domain::Continuous {
         let finite = zeros(a, b, c)?.finite;
         let of_zeros = finite.into_iter().filter(|&zero| is_right(zero) && zero.im >= 0.0);
-        let least = |zero: &Complex<f64>| forced(*zero, &poles);
-        if let Some(zero) = of_zeros.max_by(|x, y| least(x).total_cmp(&least(y))) {
+        // Above the limit the zero that forces the largest peak; otherwise the one that allows the slowest feedback.
+        let rank = |zero: &Complex<f64>| match forced(*zero, &poles) {
+            least if least > limit => -least,
+            least => allowed(*zero, least, limit),
+        };
+        if let Some(zero) = of_zeros.min_by(|x, y| rank(x).total_cmp(&rank(y))) {
             warnings.extend(of_zero(file, zero, &poles, limit));
         }
     }
@@ -126,15 +130,12 @@ fn of_zero(
     if zero.im != 0.0 || reached <= limit {
         return None;
     }
-    // The exponent t for which the bound is the limit, and the speed that gives this t.
-    let t = (limit / AT_BANDWIDTH).ln() / (least / AT_BANDWIDTH).ln();
-    let allowed = zero.re * (std::f64::consts::PI * (1.0 - 1.0 / t) / 2.0).tan();
     let message = format!(
         "a feedback of {} rad/s is too fast for the plant: {name} makes the peak of S {} or more; below {} rad/s it can \
          stay below {limit}",
         rounded(speed),
         rounded(reached),
-        rounded(allowed)
+        rounded(allowed(zero, least, limit))
     );
     Some(file.error_at(&file.feedback.place, message))
 }
@@ -150,6 +151,17 @@ fn least_peak(zero: Complex<f64>, least: f64, speed: f64) -> f64 {
     let pi = std::f64::consts::PI;
     let t = pi / (pi - 2.0 * (speed / zero.re).atan());
     least.powf(t) * AT_BANDWIDTH.powf(1.0 - t)
+}
+
+/// Returns the speed up to which a zero allows a peak of S of `limit`, rad/s; infinite for a zero that is not real.
+/// `least`: the result of [`forced`], at most `limit`.
+fn allowed(zero: Complex<f64>, least: f64, limit: f64) -> f64 {
+    if zero.im != 0.0 {
+        return f64::INFINITY;
+    }
+    // The exponent t for which the bound is the limit, and the speed that gives this t.
+    let t = (limit / AT_BANDWIDTH).ln() / (least / AT_BANDWIDTH).ln();
+    zero.re * (std::f64::consts::PI * (1.0 - 1.0 / t) / 2.0).tan()
 }
 
 /// Returns the modulus of the slowest eigenvalue that the file states for the feedback, or the stated bandwidth, rad/s;
@@ -205,5 +217,16 @@ mod tests {
             read(&format!("{text}{eigenvalues}\n"), all).unwrap().unwrap().len()
         };
         assert_eq!([count("[0.5, 0.5]"), count("[0, 0]")], [1, 0]);
+    }
+
+    /// The plant (1 - s) (1 - s / 100) / (1 + s)^3: the zero at 100 1/s allows 10 rad/s, the zero at 1 1/s does not.
+    #[test]
+    fn the_zero_that_allows_the_slowest_feedback_is_stated() {
+        let text = "A = [[0, 1, 0], [0, 0, 1], [-1, -3, -3]]\nB = [[0], [0], [1]]\nC = [[1, -1.01, 0.01]]\n\
+                    actuator_faults = \"all\"\nfeedback.eigenvalues = [-10, -11, -12]\n";
+        let all = |file: &PlantFile<'_>| warnings(file, &LinearPlant::of(file).unwrap());
+        let stated = read(text, all).unwrap().unwrap();
+        let stated: Vec<_> = stated.iter().map(ToString::to_string).collect();
+        assert!(stated.len() == 1 && stated[0].contains("its zero at 1 1/s"), "{stated:?}");
     }
 }
