@@ -79,10 +79,9 @@ fn identifier(name: &str) -> anyhow::Result<String> {
 /// Returns the value of `fmu =` in the manifest: a git URL or a folder. Returns an error for a folder without the crate
 /// fmu, and if `source` is `None` outside of a clone.
 fn dependency(source: Option<&str>) -> anyhow::Result<String> {
-    let has_form_of_url = |source: &str| source.contains("://") || source.contains('@');
-    let is_url = |source: &&str| has_form_of_url(source) && !Path::new(source).is_dir();
-    if let Some(url) = source.filter(is_url) {
-        return Ok(format!("{{ git = {} }}", quoted(url)));
+    let is_no_folder = |source: &&str| !Path::new(source).is_dir();
+    if let Some(url) = source.filter(is_no_folder).and_then(git_url) {
+        return Ok(format!("{{ git = {} }}", quoted(&url)));
     }
     let folder = match source {
         Some(folder) => std::path::absolute(folder)?,
@@ -95,6 +94,16 @@ fn dependency(source: Option<&str>) -> anyhow::Result<String> {
         bail!("{} is not the folder of the crate fmu", folder.display());
     }
     Ok(format!("{{ path = {} }}", quoted(&folder.display().to_string())))
+}
+
+/// Returns the URL of a git repository; `None` if `source` does not have the form of one. Git's short form,
+/// `user@host:path`, which cargo refuses, becomes a URL.
+fn git_url(source: &str) -> Option<String> {
+    if source.contains("://") {
+        return Some(source.to_owned());
+    }
+    let (host, path) = source.split_once(':').filter(|(host, _)| host.contains('@'))?;
+    Some(format!("ssh://{host}/{}", path.trim_start_matches('/')))
 }
 
 fn quoted(text: &str) -> String {
@@ -156,7 +165,17 @@ mod tests {
         let source = source.display().to_string();
         let path = format!("{{ path = {} }}", quoted(&source));
         assert_eq!(dependency(Some(&source)).unwrap(), path);
-        let url = dependency(Some("git@example.org:fmu")).unwrap();
-        assert_eq!(url, "{ git = \"git@example.org:fmu\" }");
+        assert!(
+            dependency(Some("you@home")).unwrap_err().to_string().contains("is not the folder")
+        );
+    }
+
+    /// Cargo answers the short form with "relative URL without a base; try using `ssh://git@example.org/owner/fmu`".
+    #[test]
+    fn the_short_form_of_a_git_repository_becomes_a_url() {
+        for source in ["git@example.org:owner/fmu", "ssh://git@example.org/owner/fmu"] {
+            let url = dependency(Some(source)).unwrap();
+            assert_eq!(url, "{ git = \"ssh://git@example.org/owner/fmu\" }");
+        }
     }
 }
