@@ -26,7 +26,7 @@ const HEADERS: [(&str, &str); 6] = [
 /// The folders that are copied from an FMU to the FMU that is built from it.
 const PARTS: [&str; 4] = ["binaries", "resources", "terminalsAndIcons", "extra"];
 /// Version of the build procedure, a part of the cache key. Change it whenever the procedure changes.
-const RECIPE: u32 = 3;
+const RECIPE: u32 = 4;
 /// Largest number of characters of compiler output that an error quotes.
 const OUTPUT: usize = 4000;
 
@@ -258,7 +258,8 @@ struct Build<'a> {
 
 impl<'a> Build<'a> {
     fn new(path: &'a Path, unpacked: &Unpacked) -> Result<Self, CompileError> {
-        let configurations = description::read(unpacked.folder());
+        let platforms = platforms_of(unpacked.description.version());
+        let configurations = description::read(unpacked.folder(), platforms);
         let configurations = configurations
             .map_err(|reason| CompileError::Description { path: path.to_owned(), reason })?;
         let mut sets = configurations.iter().flat_map(|configuration| &configuration.sets);

@@ -10,6 +10,8 @@ use fmu_description::xml::{self, Element};
 /// `BuildConfiguration`: how one library is built.
 pub(super) struct BuildConfiguration {
     pub(super) model_identifier: String,
+    /// The platform tuple for which it is; `None`: all other platforms.
+    platform: Option<String>,
     pub(super) sets: Vec<SourceFileSet>,
     /// Names of libraries of the system, for the linker.
     pub(super) libraries: Vec<String>,
@@ -58,10 +60,11 @@ fn is_source(path: &String) -> bool {
     !["h", "hh", "hpp", "hxx", "inc"].iter().any(|known| extension.eq_ignore_ascii_case(known))
 }
 
-/// Reads how the libraries of the FMU in `folder` are built. On failure returns what is missing or wrong.
-pub(super) fn read(folder: &Path) -> Result<Vec<BuildConfiguration>, String> {
+/// Reads how the libraries of the FMU in `folder` are built: first the configurations for one of `platforms`, then those
+/// without a platform, then others. On failure returns what is missing or wrong.
+pub(super) fn read(folder: &Path, platforms: &[&str]) -> Result<Vec<BuildConfiguration>, String> {
     let file = folder.join("sources/buildDescription.xml");
-    let configurations = if file.is_file() {
+    let mut configurations = if file.is_file() {
         let root = root(&file)?;
         children(&root, "BuildConfiguration").map(configuration).collect::<Result<Vec<_>, _>>()?
     } else {
@@ -79,6 +82,11 @@ pub(super) fn read(folder: &Path) -> Result<Vec<BuildConfiguration>, String> {
                 .to_owned(),
         );
     }
+    configurations.sort_by_key(|configuration| match &configuration.platform {
+        Some(platform) if platforms.contains(&platform.as_str()) => 0,
+        None => 1,
+        Some(_) => 2,
+    });
     Ok(configurations)
 }
 
@@ -139,6 +147,7 @@ fn configuration(element: &Element) -> Result<BuildConfiguration, String> {
     let libraries = children(element, "Library").filter_map(|library| attribute(library, "name"));
     Ok(BuildConfiguration {
         model_identifier: attribute(element, "modelIdentifier").unwrap_or_default(),
+        platform: attribute(element, "platform"),
         sets: children(element, "SourceFileSet").map(set).collect::<Result<_, _>>()?,
         libraries: libraries.collect(),
     })
@@ -150,6 +159,7 @@ fn source_files(element: &Element) -> Result<BuildConfiguration, String> {
     let set = SourceFileSet { files: sources(files)?, ..SourceFileSet::default() };
     Ok(BuildConfiguration {
         model_identifier: attribute(element, "modelIdentifier").unwrap_or_default(),
+        platform: None,
         sets: vec![set],
         libraries: Vec::new(),
     })
@@ -157,6 +167,8 @@ fn source_files(element: &Element) -> Result<BuildConfiguration, String> {
 
 #[cfg(test)]
 mod tests {
+    use fmu_description::package::TemporaryFolder;
+
     use super::*;
 
     #[test]
@@ -188,6 +200,33 @@ mod tests {
         let definitions = definitions.map(|(name, value)| (name.as_str(), value.as_deref()));
         let expected = [("A", Some("2")), ("B", None), ("E", None)];
         assert_eq!(definitions.collect::<Vec<_>>(), expected);
+    }
+
+    /// FMI 3.0.2, section 2.4.10: one configuration at most for each platform, and one for all others.
+    #[test]
+    fn the_configuration_of_this_platform_comes_before_that_of_all_others() {
+        let folder = TemporaryFolder::new().unwrap();
+        fs::create_dir(folder.path().join("sources")).unwrap();
+        let configuration = |attributes: &str, library: &str| {
+            format!(
+                r#"<BuildConfiguration modelIdentifier="m"{attributes}><SourceFileSet>
+                <SourceFile name="m.c"/></SourceFileSet><Library name="{library}"/></BuildConfiguration>"#
+            )
+        };
+        let text = [
+            configuration(r#" platform="x86_64-windows""#, "ws2_32"),
+            configuration("", "any"),
+            configuration(r#" platform="x86_64-linux""#, "rt"),
+        ];
+        let text = format!("<fmiBuildDescription>{}</fmiBuildDescription>", text.concat());
+        fs::write(folder.path().join("sources/buildDescription.xml"), text).unwrap();
+        for (platforms, expected) in [
+            (["linux64", "x86_64-linux"], "rt"),
+            (["win64", "x86_64-windows"], "ws2_32"),
+            (["aarch64-darwin", "darwin64"], "any"),
+        ] {
+            assert_eq!(read(folder.path(), &platforms).unwrap()[0].libraries, [expected]);
+        }
     }
 
     #[test]
