@@ -17,8 +17,10 @@ pub(super) fn bounds(report: &Report) -> Markup {
     html! {
         p {
             "The peak-to-peak (L1) gain is the largest magnitude that a quantity can reach while \
-             the fault, or its rate, stays within plus and minus one. The bound is the smaller of \
-             gain times bound, where the plant file bounds the fault or its rate."
+             the fault, or its rate, stays within plus and minus one. The bound is the gain of the \
+             fault times its " code { "bound" } " in the plant file. A constant fault that has a "
+            code { "rate_bound" } ", too, has a smaller one if the gain of its rate times "
+            code { "rate_bound" } ", with what the commands leave of the fault, is less."
         }
         (table_of("Largest values", &report.bounds, &columns))
     }
