@@ -320,7 +320,11 @@ impl<'a> Build<'a> {
         let library = folder.path().join(format!("library{}", std::env::consts::DLL_SUFFIX));
         let mut command = linker.unwrap_or(&self.c).command();
         command.arg("-shared").arg("-o").arg(&library).args(&objects);
-        command.args(configuration.libraries.iter().map(|name| format!("-l{name}"))).arg("-lm");
+        let (binaries, platforms) =
+            (self.sources.with_file_name("binaries"), platforms_of(self.version));
+        let libraries = configuration.libraries.iter();
+        command.args(libraries.map(|name| library_argument(&binaries, platforms, name)));
+        command.arg("-lm");
         self.run(&mut command, "linking")?;
         fs::read(&library).map_err(file_error("read", &library))
     }
@@ -380,6 +384,17 @@ fn source_file(sources: &Path, file: &str) -> PathBuf {
     without.filter(|path| !stated.is_file() && path.is_file()).unwrap_or(stated)
 }
 
+/// Returns the argument of the linker for the library `name`: the file in a folder of `platforms` below `binaries`, or
+/// a library of the system if there is no such file.
+fn library_argument(binaries: &Path, platforms: &[&str], name: &str) -> OsString {
+    let names = [name.to_owned(), format!("lib{name}.a")];
+    let mut paths = platforms
+        .iter()
+        .flat_map(|platform| names.iter().map(move |name| binaries.join(platform).join(name)));
+    let file = paths.find(|path| path.is_file());
+    file.map_or_else(|| format!("-l{name}").into(), PathBuf::into_os_string)
+}
+
 /// Hashes the names and contents of all files of a folder.
 fn hash_folder(folder: &Path, hasher: &mut DefaultHasher) -> io::Result<()> {
     let mut paths: Vec<PathBuf> =
@@ -409,5 +424,24 @@ mod tests {
         fs::create_dir(folder.path().join("sources")).unwrap();
         fs::write(&nested, "").unwrap();
         assert_eq!(source_file(folder.path(), "sources/a.c"), nested);
+    }
+
+    /// FMI 3.0.2, section 2.5.1.3: a library is in the folder of the platform unless it is `external`.
+    #[test]
+    fn a_library_in_the_fmu_is_linked_from_its_file() {
+        let folder = TemporaryFolder::new().unwrap();
+        let binaries = folder.path().join("binaries");
+        let platform = binaries.join("x86_64-linux");
+        fs::create_dir_all(&platform).unwrap();
+        for name in ["openlibm.a", "libsolver.a"] {
+            fs::write(platform.join(name), "").unwrap();
+        }
+        for (name, expected) in [
+            ("openlibm.a", platform.join("openlibm.a").into_os_string()),
+            ("solver", platform.join("libsolver.a").into_os_string()),
+            ("hdf5", "-lhdf5".into()),
+        ] {
+            assert_eq!(library_argument(&binaries, &["linux64", "x86_64-linux"], name), expected);
+        }
     }
 }

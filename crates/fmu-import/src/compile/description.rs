@@ -13,7 +13,7 @@ pub(super) struct BuildConfiguration {
     /// The platform tuple for which it is; `None`: all other platforms.
     platform: Option<String>,
     pub(super) sets: Vec<SourceFileSet>,
-    /// Names of libraries of the system, for the linker.
+    /// Names of libraries for the linker: of files in `binaries`, or of libraries of the system.
     pub(super) libraries: Vec<String>,
 }
 
@@ -60,8 +60,8 @@ fn is_source(path: &String) -> bool {
     !["h", "hh", "hpp", "hxx", "inc"].iter().any(|known| extension.eq_ignore_ascii_case(known))
 }
 
-/// Reads how the libraries of the FMU in `folder` are built: first the configurations for one of `platforms`, then those
-/// without a platform, then others. On failure returns what is missing or wrong.
+/// Reads how the libraries of the FMU in `folder` are built: first the configurations for one of `platforms`, then
+/// those without a platform, then others. On failure returns what is missing or wrong.
 pub(super) fn read(folder: &Path, platforms: &[&str]) -> Result<Vec<BuildConfiguration>, String> {
     let file = folder.join("sources/buildDescription.xml");
     let mut configurations = if file.is_file() {
@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(definitions.collect::<Vec<_>>(), expected);
     }
 
-    /// FMI 3.0.2, section 2.4.10: one configuration at most for each platform, and one for all others.
+    /// FMI 3.0.2, section 2.5.1.3: one configuration at most for each platform, and one for all others.
     #[test]
     fn the_configuration_of_this_platform_comes_before_that_of_all_others() {
         let folder = TemporaryFolder::new().unwrap();
