@@ -65,8 +65,8 @@ pub(crate) struct DelayedPlant {
     pub(crate) g: DMatrix<f64>,
 }
 
-/// Adds to a plant the states with which the observer approximates its delays, and the filters of a controller of low
-/// order. `f`, `g`: the columns by which faults enter x' and y.
+/// Adds to a plant the states with which the observer approximates the plant's delays and, for a PI, PID or other
+/// controller of low order, the filters of its measurements. `f`, `g`: the columns by which faults enter x' and y.
 pub(crate) fn delayed(
     file: &PlantFile<'_>,
     plant: &StateSpace,
