@@ -49,7 +49,7 @@ pub trait System {
 /// Where [`Integrator::advance`] stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reached {
-    /// At the end.
+    /// At the requested end time.
     End,
     /// At a state event: an indicator changed between z > 0 and z <= 0.
     Event,
