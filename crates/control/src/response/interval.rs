@@ -11,7 +11,7 @@ use std::rc::Rc;
 const SHORTEST: f64 = 1.0 / 4096.0;
 /// Relative rounding error of a product of a row and a state, the errors of the doublings included.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// Largest number of doublings of the length.
+/// Largest number of interval lengths that are tried, each twice the one before.
 const LENGTHS: usize = 120;
 
 /// Intervals of one length for one output row c, as matrices that act on the state x at the start; h(t) = c x(t).
