@@ -155,9 +155,9 @@ impl<'a> Node<'a> {
     pub(super) fn number(&self, name: &'static str) -> Result<Option<f64>> {
         let Some((text, trimmed)) = self.content(name, NUMBER) else { return Ok(None) };
         if is_not_finite(trimmed) {
-            // The schema allows these spellings, the text of FMI does not.
-            let by_schema = !["INF", "-INF", "NaN"].contains(&trimmed);
-            self.warn_of(by_schema, self.place(name), NUMBER, format!("{text:?}"), NOTHING);
+            // The schema allows `INF`, `-INF` and `NaN`, which the text of FMI excludes; it allows no other spelling.
+            let violates_schema = !["INF", "-INF", "NaN"].contains(&trimmed);
+            self.warn_of(violates_schema, self.place(name), NUMBER, format!("{text:?}"), NOTHING);
             return Ok(None);
         }
         match trimmed.parse::<f64>() {
@@ -263,7 +263,7 @@ impl<'a> Node<'a> {
         self.has(name).then(|| self.flag(name))
     }
 
-    /// Parses an `xs:boolean`; warns of another case.
+    /// Parses an `xs:boolean`. Accepts `true` and `false` with upper-case letters, too, with a warning.
     fn parse_boolean(&self, name: &'static str, text: &str) -> Option<bool> {
         let value = match text {
             "true" | "1" => return Some(true),
