@@ -551,7 +551,7 @@ fn a_continuous_schedule_has_no_ranges() {
     read(&sampled, |_| ()).unwrap();
 }
 
-/// As in `[robustness]`, a single number holds for all signals.
+/// A single number, not in a list, applies to all signals, as in `[robustness]`.
 #[test]
 fn a_list_of_noise_has_one_number_for_each_signal() {
     let text = |noise: &str| {
