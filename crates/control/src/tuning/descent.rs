@@ -29,7 +29,7 @@ impl Tuning<'_> {
     ///
     /// Method: steps of sequential quadratic programming for the maximum over the local maxima of a grid of
     /// frequencies, with a BFGS approximation of the Hessian of the Lagrangian. After each of these searches the
-    /// frequency of the verified norm is added to the grid. The result is a local minimum at best; gamma is verified.
+    /// frequency of the verified peak is added to the grid. The result is a local minimum at best; gamma is verified.
     ///
     /// Source: P. Apkarian and D. Noll, Nonsmooth H-infinity synthesis, IEEE Trans. Autom. Control 51
     /// (2006); J. V. Burke, D. Henrion, A. S. Lewis and M. L. Overton, HIFOO (2006).
@@ -37,7 +37,7 @@ impl Tuning<'_> {
     /// # Errors
     ///
     /// Same as [`Tuning::peak`]; [`Error::Shape`] for `scales` of another length;
-    /// [`Error::OutOfRange`] for a rate that is not above zero.
+    /// [`Error::OutOfRange`] for a [`Tuning::rate`] that is not above zero.
     pub fn tuned(&self, start: &DVector<f64>, scales: &DVector<f64>) -> Result<Tuned, Error> {
         check::positive("the rate", self.rate)?;
         check::length("scales", scales.as_slice(), start.len())?;
