@@ -1,4 +1,4 @@
-//! `ModelStructure` as data.
+//! The element `ModelStructure` of a model description.
 
 use serde::Serialize;
 
