@@ -24,7 +24,7 @@ enum Stage {
     MatrixRequested,
     /// A step with the matrix computed at its start.
     NewMatrix,
-    /// A step with a matrix computed elsewhere.
+    /// A step with the matrix of an earlier step or solution.
     OldMatrix,
     /// A return to the start of a rejected step, to request the matrix there.
     Returned,
