@@ -140,7 +140,7 @@ fn a_killed_run_leaves_the_rows_up_to_its_last_write() {
     assert_eq!(times(&path).len(), 10);
 }
 
-/// A kill can divide a write between two pages of memory only.
+/// A kill can split a write only at a boundary between two memory pages.
 #[test]
 fn a_run_that_is_killed_during_a_write_leaves_a_file_with_the_rows_of_the_write_before() {
     const MEMORY_PAGE: u64 = 4096;
