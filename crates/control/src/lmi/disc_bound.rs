@@ -118,7 +118,8 @@ impl InverseRange {
     }
 }
 
-/// The bound from the trace at s = 0 and det H at points s > 0; `sizes`: the q singular values of E B.
+/// The lower bound of the norm that the two bounds with H in [`disc_norm_lower_bound`] give together; `sizes`: the q
+/// singular values of E B.
 fn by_zeros(eigenvalues: &InverseRange, zeros: &[Complex<f64>], sizes: &DVector<f64>) -> f64 {
     let (least, inverses) = (sizes.min(), sizes.map(f64::recip).sum());
     let inputs = as_number(sizes.len());
