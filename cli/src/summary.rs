@@ -73,7 +73,8 @@ struct Numbers {
     p: Rows,
     p_smallest_eigenvalue: f64,
     p_largest_eigenvalue: f64,
-    /// Residual of equation (12), each entry relative to the terms of its sum.
+    /// Residual of the Lyapunov equation (12) of the paper: the largest ratio of an entry to the sum of its
+    /// absolute terms.
     residual: f64,
     delta: f64,
     note: &'static str,
