@@ -30,11 +30,11 @@ pub(crate) struct GainResult {
 /// The noise for which a Kalman filter is optimal, and the covariance of its predicted estimate.
 #[derive(Clone)]
 pub(crate) struct Noise {
-    /// W, of the states of the observer.
+    /// W, the covariance of the noise on the states of the observer; its intensity in continuous time.
     pub(crate) process: DMatrix<f64>,
-    /// V, of the measurements.
+    /// V, the covariance of the noise of the measurements; its intensity in continuous time.
     pub(crate) measurements: DMatrix<f64>,
-    /// P, of the states of the observer.
+    /// P, the covariance of the predicted states of the observer.
     pub(crate) covariance: DMatrix<f64>,
     /// Whether all three are known up to a common factor only, which the gain does not depend on.
     pub(crate) is_relative: bool,
