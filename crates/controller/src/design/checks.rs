@@ -395,8 +395,8 @@ impl Design {
         Some(Refusal::new("transfer".to_owned(), value, rule))
     }
 
-    /// The largest decay of a filter or of the transfer, and the range in words: a rate in 1/s; in a sampled controller
-    /// the fraction that decays in one sample.
+    /// The largest allowed value of `filter` and `transfer`, and the allowed range in words. The values are rates in
+    /// 1/s; in a sampled controller, they are the fractions that decay in one sample.
     fn rates(&self) -> (f64, &'static str) {
         match self.sample_time {
             None => (f64::MAX, "more than 0 1/s"),
