@@ -83,7 +83,8 @@ pub struct AsoController {
     schedule_value: f64,
     /// `schedule_value` limited to the grid of the schedule.
     pub(crate) schedule_at: f64,
-    /// Whether the exporter integrates the equations: in co-simulation of a continuous controller with a schedule.
+    /// Whether the solver of the crate `fmu` integrates the equations: in co-simulation of a continuous controller with
+    /// a schedule.
     is_integrated: bool,
     /// Whether a value outside of the schedule was reported.
     outside_reported: bool,
