@@ -26,7 +26,7 @@ impl Elements {
         Self { form, magnitude: none.clone(), error: none }
     }
 
-    /// The elements as numbers of the equations.
+    /// The elements as [`Rounded`] numbers, from which the equations of the controller compute others.
     pub(super) fn numbers(&self) -> Vec<Rounded> {
         let row = |matrix: &DMatrix<f64>, i: usize| matrix.row(i).into_owned();
         let element = |i| Element {
