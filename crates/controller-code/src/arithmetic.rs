@@ -194,7 +194,7 @@ fn test(detection: &Detection, residuals: &[Counted]) {
         Method::Cusum => {
             let sums = [Counted; 2];
             for residual in residuals {
-                Cumulative { sums, since: [0; 2] }.take(residual, &Counted, 0);
+                Cumulative { sums, since: [0; 2] }.add_sample(residual, &Counted, 0);
             }
         }
         Method::Window => {
@@ -202,7 +202,7 @@ fn test(detection: &Detection, residuals: &[Counted]) {
             let mut terms = sums.iter_mut().zip(residuals);
             for test in &detection.tests {
                 let terms = terms.by_ref().take(test.residuals);
-                Window { since: 0, count: 0 }.take(terms, 1, 0);
+                Window { since: 0, count: 0 }.add_sample(terms, 1, 0);
             }
         }
     }

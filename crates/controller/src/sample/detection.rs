@@ -71,7 +71,7 @@ impl<N: Number> Cumulative<N> {
     /// Adds the residual of a sample to both sums. Returns the larger sum, and the sample since which it is above 0, or
     /// this sample.
     #[inline(always)]
-    pub fn take(&mut self, residual: &N, drift: &N, sample: u32) -> (N, u32) {
+    pub fn add_sample(&mut self, residual: &N, drift: &N, sample: u32) -> (N, u32) {
         for (sum, since) in self.sums.iter().zip(self.since.iter_mut()) {
             if !sum.is_above(&N::zero()) {
                 *since = sample;
@@ -99,7 +99,7 @@ impl Window {
     /// Adds the residuals of a sample to their sums. Returns the statistic and the first sample of the window if this
     /// sample completes it, else `None`.
     #[inline(always)]
-    pub fn take<'a, N: Number + 'a>(
+    pub fn add_sample<'a, N: Number + 'a>(
         &mut self,
         sums: impl Iterator<Item = (&'a mut N, &'a N)>,
         length: u32,
@@ -205,7 +205,7 @@ impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
         let inputs = tests.iter_mut().zip(residuals).zip(drifts);
         self.compare(
             sample,
-            inputs.map(|((test, residual), drift)| Some(test.take(residual, drift, sample))),
+            inputs.map(|((test, residual), drift)| Some(test.add_sample(residual, drift, sample))),
         );
     }
 
@@ -225,7 +225,7 @@ impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
         self.compare(
             sample,
             tests.map(|((window, count), length)| {
-                window.take(sums.by_ref().take(*count), *length, sample)
+                window.add_sample(sums.by_ref().take(*count), *length, sample)
             }),
         );
     }
