@@ -55,24 +55,25 @@ impl Response {
             return Ok(None);
         }
         let Some(hamiltonian) = self.hamiltonian(scales) else { return Ok(None) };
-        let mut places: Vec<f64> =
+        let mut candidates: Vec<f64> =
             complex_eigenvalues(&hamiltonian)?.iter().map(|value| value.im).collect();
-        places.sort_by(f64::total_cmp);
-        let above: Vec<f64> = places.iter().copied().filter(|place| *place > frequency).collect();
+        candidates.sort_by(f64::total_cmp);
+        let above: Vec<f64> = candidates.iter().copied().filter(|w| *w > frequency).collect();
         let below: Vec<f64> =
-            places.iter().rev().copied().filter(|place| *place <= frequency).collect();
-        // The first of `places` that is negative, or at or after which the scales do not hold; `last` ends the search.
-        let end = |places: &[f64], last: f64| {
-            for (at, &place) in places.iter().enumerate() {
-                let middle = places.get(at + 1).map_or(last, |next| 0.5 * (place + next));
-                if place < 0.0 || !(holds(place)? && holds(middle)?) {
-                    return Ok(Some(place));
+            candidates.iter().rev().copied().filter(|w| *w <= frequency).collect();
+        // The first candidate that is negative, or at or after which the scales do not hold. After each candidate they
+        // are tested in the middle between it and the next one, after the last candidate at `last`.
+        let end = |candidates: &[f64], last: f64| {
+            for (at, &candidate) in candidates.iter().enumerate() {
+                let after = candidates.get(at + 1).map_or(last, |next| 0.5 * (candidate + next));
+                if candidate < 0.0 || !(holds(candidate)? && holds(after)?) {
+                    return Ok(Some(candidate));
                 }
             }
             Ok::<_, Error>(None)
         };
         let to = match end(&above, f64::INFINITY)? {
-            Some(place) => place,
+            Some(candidate) => candidate,
             None if holds(f64::INFINITY)? => f64::INFINITY,
             None => f64::MAX,
         };
