@@ -48,19 +48,20 @@ pub fn regulator_of_same_speed(
     let required = speed(&(a + b * gain), domain)?;
     let scale = Balance::new(a).scale;
     let q = DMatrix::from_diagonal(&scale.map(|unit| 1.0 / (unit * unit)));
-    let lengths = DMatrix::from_fn(n, b.ncols(), |i, j| b[(i, j)] / scale[i]);
-    let lengths = lengths.column_iter().map(|column| column.norm_squared());
-    let lengths: Vec<f64> = lengths.map(|size| if size > 0.0 { size } else { 1.0 }).collect();
-    let r = DMatrix::from_diagonal(&lengths.into());
+    let balanced = DMatrix::from_fn(n, b.ncols(), |i, j| b[(i, j)] / scale[i]);
+    let squares = balanced.column_iter().map(|column| column.norm_squared());
+    let squares: Vec<f64> = squares.map(|size| if size > 0.0 { size } else { 1.0 }).collect();
+    let r = DMatrix::from_diagonal(&squares.into());
     let solve = |power: f64| {
         let weights = Weights { q: &q * 10_f64.powf(power), r: r.clone(), n: None };
         lqr(a, b, &weights, domain).ok().map(|regulator| regulator.gain)
     };
     let [mut slow, mut fast] = POWERS.map(|power| End { power, excess: f64::NAN });
     for step in 1..=STEPS {
-        let part = slow.excess / (slow.excess - fast.excess);
-        let part = if part.is_finite() && step % 3 != 0 { part } else { 0.5 };
-        let power = slow.power + part * (fast.power - slow.power);
+        // Regula falsi, with a bisection in every third step and while a speed is not known.
+        let fraction = slow.excess / (slow.excess - fast.excess);
+        let fraction = if fraction.is_finite() && step % 3 != 0 { fraction } else { 0.5 };
+        let power = slow.power + fraction * (fast.power - slow.power);
         let Some(gain) = solve(power) else {
             // Extreme weights have no verified solution.
             *(if power < 0.0 { &mut slow } else { &mut fast }) = End { power, excess: f64::NAN };
