@@ -36,13 +36,13 @@ pub(super) fn of_entries(
     if budget.is_over() {
         return Err(budget.reason());
     }
-    let most = test.first_unstable.min(MOST);
+    let largest = test.first_unstable.min(MOST);
     let tolerances = tolerances(linear, JUDGED, limits).placed;
     let family =
         EntryFamily::new(&physical.plant, &tolerances).map_err(|error| error.to_string())?;
-    let proof = proven_tolerance(&family, &physical.controller, most, &|| budget.is_over());
+    let proof = proven_tolerance(&family, &physical.controller, largest, &|| budget.is_over());
     match proof.map_err(|error| format!("not proven: {error}"))? {
-        Ok(proof) => Ok(reported(&proof, most)),
+        Ok(proof) => Ok(reported(&proof, largest)),
         Err(Unproven::Ended) => Err(budget.reason()),
         Err(Unproven::LongSampleTime) => {
             Err("not proven: the sample time is too long against the time constants of the plant"
