@@ -106,10 +106,13 @@ fn signal(entry: &Entry<'_>, keys: &[&str]) -> Result<Signal> {
 pub(crate) fn name(entry: &Entry<'_>) -> Result<String> {
     match entry.text()? {
         "" => Err(entry.error("expected a name, found an empty text")),
-        name => match name.chars().find(|sign| sign.is_control() || !is_character(*sign)) {
+        name => match name
+            .chars()
+            .find(|character| character.is_control() || !is_character(*character))
+        {
             None => Ok(name.to_owned()),
-            Some(sign) => Err(entry.error(format!(
-                "expected a name of one line without control characters, found {sign:?} in it"
+            Some(character) => Err(entry.error(format!(
+                "expected a name of one line without control characters, found {character:?} in it"
             ))),
         },
     }
@@ -119,10 +122,10 @@ pub(crate) fn name(entry: &Entry<'_>) -> Result<String> {
 pub(crate) fn description(table: &Table<'_>) -> Result<String> {
     let Some(entry) = table.get("description") else { return Ok(String::new()) };
     let text = entry.text()?;
-    match text.chars().find(|sign| !is_character(*sign)) {
+    match text.chars().find(|character| !is_character(*character)) {
         None => Ok(text.to_owned()),
-        Some(sign) => {
-            Err(entry.error(format!("found {sign:?}, which the XML of an FMU cannot hold")))
+        Some(character) => {
+            Err(entry.error(format!("found {character:?}, which the XML of an FMU cannot hold")))
         }
     }
 }
