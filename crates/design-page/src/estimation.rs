@@ -24,20 +24,20 @@ pub(super) fn details(estimation: &Estimation) -> Markup {
     html! {
         ul { @for line in &estimation.equations { li { code { (line) } } } }
         (table_of("Parameters", &estimation.parameters, &parameters))
-        (checked("Conditions for its existence", "value", &estimation.conditions))
+        (check_table("Conditions for its existence", "value", &estimation.conditions))
         (errors(&estimation.errors))
     }
 }
 
-/// Shows conditions; `number`: the head of the column of their values.
-pub(super) fn checked(caption: &str, number: &str, checks: &[Check]) -> Markup {
+/// Shows conditions as a table; `value_heading`: the head of the column of their values.
+pub(super) fn check_table(caption: &str, value_heading: &str, checks: &[Check]) -> Markup {
     table_of(
         caption,
         checks,
         &[
             ("condition", |one| (&one.condition).into()),
             ("holds", |one| Cell::Holds(one.holds)),
-            (number, |one| one.value.into()),
+            (value_heading, |one| one.value.into()),
             ("explanation", |one| (&one.explanation).into()),
         ],
     )

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::estimation::checked;
+use super::estimation::check_table;
 use super::matrix::{literals, matrices};
 use super::table::{Columns, table_of};
 use design_report::{Effectiveness, PidController, Plant, Report, Signal};
@@ -36,7 +36,7 @@ fn signals(caption: &str, signals: &[Signal]) -> Markup {
 }
 
 pub(super) fn checks(report: &Report) -> Markup {
-    checked("What must hold, and whether it does", "number", &report.checks)
+    check_table("What must hold, and whether it does", "number", &report.checks)
 }
 
 pub(super) fn gains(report: &Report) -> Markup {
