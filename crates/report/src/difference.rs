@@ -154,10 +154,10 @@ pub(crate) fn compare(
                 );
             }
         })?;
-        let outside = series.outside();
+        let outside_there = series.outside();
         reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
         if !view.is_part() {
-            comparison.outside_there = outside;
+            comparison.outside_there = outside_there;
         }
         let common: Vec<bool> = partners.iter().map(Option::is_some).collect();
         let differences: Vec<_> = sums.into_iter().map(Sum::finish).collect();
