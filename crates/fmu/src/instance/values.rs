@@ -205,7 +205,7 @@ impl<M: Model> Instance<M> {
                 slot.settable & state != 0 && slot.range.0 <= value && value <= slot.range.1
             };
             let Some(slot) = slot(reference).filter(is_accepted) else {
-                return self.rejection(to, values);
+                return self.check_reals(to, values);
             };
             parameters |= slot.causality == Causality::Parameter;
         }
@@ -220,9 +220,9 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// Returns the failure of the first value that cannot be set.
+    /// Checks all values; returns the failure of the first one that cannot be set.
     #[cold]
-    fn rejection(&self, to: &[u32], values: &[f64]) -> Result<(), Failure> {
+    fn check_reals(&self, to: &[u32], values: &[f64]) -> Result<(), Failure> {
         for (&reference, &value) in to.iter().zip(values) {
             let slot = self.interface.real(reference)?.ok_or_else(time_is_independent)?;
             check_settable(slot, self.core.state)?;
