@@ -81,31 +81,31 @@ impl Examination<'_> {
         let Cases { designed, request } = self.cases;
         let Solution { linear, extended, domain, .. } = designed;
         let actuator = failed.map(|(actuator, _)| actuator);
-        let whole = self
+        let closed_loop = self
             .cases
             .whole(&self.gains, actuator.map(|failed_actuator| (failed_actuator, request.loss)))?;
         let Vertex { a, b } = self.cases.vertices().swap_remove(at);
         let fed_back = &a + &b * self.gains.k_x.columns(0, extended.states);
         let (points, delay_margin) = self.margins(actuator)?;
-        let relative = |(signal, (share, intact)): (&Signal, (&f64, &f64))| {
-            let (name, value) = (signal.name.clone(), share / intact);
+        let relative = |(signal, (norm, intact)): (&Signal, (&f64, &f64))| {
+            let (name, value) = (signal.name.clone(), norm / intact);
             value.is_finite().then_some(Number { name, unit: None, value })
         };
-        let noise = self::noise(designed, &whole)?;
-        let price = linear.measurements.iter().zip(noise.iter().zip(&self.reference));
-        let (rest, stuck) = self.rest(&whole, failed)?;
-        let commands = commands(&linear.actuators, &rest.u, &stuck);
-        let gone: Vec<_> = stuck.iter().map(|(actuator, _)| *actuator).collect();
+        let noise = self::noise(designed, &closed_loop)?;
+        let norms = linear.measurements.iter().zip(noise.iter().zip(&self.reference));
+        let (equilibrium, stuck) = self.equilibrium(&closed_loop, failed)?;
+        let commands = commands(&linear.actuators, &equilibrium.u, &stuck);
+        let lost: Vec<_> = stuck.iter().map(|(actuator, _)| *actuator).collect();
         Ok(FallbackCase {
             name: self.cases.name(at),
-            decay: decay(&whole, *domain)?,
+            decay: decay(&closed_loop, *domain)?,
             feedback_decay: decay(&fed_back, *domain)?,
             points,
             delay_margin,
-            price: price.filter_map(relative).collect(),
-            beyond_limits: beyond_limits(&linear.actuators, &commands, &gone),
+            price: norms.filter_map(relative).collect(),
+            beyond_limits: beyond_limits(&linear.actuators, &commands, &lost),
             commands,
-            measurements: rest.measurements,
+            measurements: equilibrium.measurements,
         })
     }
 
@@ -136,14 +136,14 @@ impl Examination<'_> {
     ///
     /// The input of the loop is what the failure adds to the actuator's command at the operating point: the stuck
     /// command less that command, or the lost part with a negative sign.
-    fn rest(
+    fn equilibrium(
         &self,
-        whole: &DMatrix<f64>,
+        closed_loop: &DMatrix<f64>,
         failed: Option<(usize, f64)>,
     ) -> Result<(Rest, Vec<(usize, f64)>), Error> {
         let Cases { designed, request } = self.cases;
         let Solution { linear, plant, extended, domain, .. } = designed;
-        let (n, order) = (plant.a.nrows(), whole.nrows());
+        let (n, order) = (plant.a.nrows(), closed_loop.nrows());
         let mut input = DVector::zeros(order);
         let mut stuck = Vec::new();
         if let Some((actuator, stuck_at)) = failed {
@@ -154,8 +154,8 @@ impl Examination<'_> {
             stuck.extend(gone.then_some((actuator, stuck_at)));
         }
         let held = match domain {
-            Domain::Continuous => -whole,
-            Domain::Sampled { .. } => DMatrix::identity(order, order) - whole,
+            Domain::Continuous => -closed_loop,
+            Domain::Sampled { .. } => DMatrix::identity(order, order) - closed_loop,
         };
         let solved = held.lu().solve(&input);
         let what = "the equilibrium of the fall-back";
@@ -167,13 +167,13 @@ impl Examination<'_> {
     }
 }
 
-/// Returns the H2 norms from white noise on the commands, before a loss, to the measurements of the loop `whole`.
-fn noise(designed: &Solution, whole: &DMatrix<f64>) -> Result<Vec<f64>, Error> {
+/// Returns the H2 norms from white noise on the commands, before a loss, to the measurements of the closed loop.
+fn noise(designed: &Solution, closed_loop: &DMatrix<f64>) -> Result<Vec<f64>, Error> {
     let Solution { linear, plant, domain, .. } = designed;
-    let (p, order) = (linear.c.nrows(), whole.nrows());
+    let (p, order) = (linear.c.nrows(), closed_loop.nrows());
     let b = plant.b.clone().resize_vertically(order, 0.0);
     let system = StateSpace {
-        a: whole.clone(),
+        a: closed_loop.clone(),
         d: DMatrix::zeros(p, b.ncols()),
         b,
         c: linear.c.clone().resize_horizontally(order, 0.0),
