@@ -426,7 +426,7 @@ mod tests {
         assert_eq!(source_file(folder.path(), "sources/a.c"), nested);
     }
 
-    /// FMI 3.0.2, section 2.5.1.3: a library is in the folder of the platform unless it is `external`.
+    /// FMI 3.0.2, section 2.4.10: a library is in the folder of the platform unless it is `external`.
     #[test]
     fn a_library_in_the_fmu_is_linked_from_its_file() {
         let folder = TemporaryFolder::new().unwrap();

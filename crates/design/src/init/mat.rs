@@ -50,7 +50,7 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
         c = c.transpose();
     }
     let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
-    // As in `ss` of MATLAB, a D of zeros may have any size.
+    // `ss` of MATLAB takes the number 0 for a D of any size.
     let stated = matrix("D")?.filter(|d| d.iter().any(|&entry| entry != 0.0));
     let mut d = stated.unwrap_or_else(|| DMatrix::zeros(p, m));
     if m.min(p) == 1 && d.shape() == (m, p) {

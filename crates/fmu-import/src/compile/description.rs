@@ -1,4 +1,4 @@
-//! How the library of an FMU is built: `sources/buildDescription.xml` (FMI 3.0.2, section 2.5.1.3), or the
+//! How the library of an FMU is built: `sources/buildDescription.xml` (FMI 3.0.2, section 2.4.10), or the
 //! elements `SourceFiles` of FMI 2.0.
 
 use std::fs;
@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(definitions.collect::<Vec<_>>(), expected);
     }
 
-    /// FMI 3.0.2, section 2.5.1.3: one configuration at most for each platform, and one for all others.
+    /// FMI 3.0.2, section 2.4.10: one configuration at most for each platform, and one for all others.
     #[test]
     fn the_configuration_of_this_platform_comes_before_that_of_all_others() {
         let folder = TemporaryFolder::new().unwrap();
