@@ -108,7 +108,8 @@ def _entries(a: Any, b: Any, c: Any, d: Any = 0.0) -> dict[str, Any]:
     matrices["A"] = numpy.atleast_2d(matrices["A"])
     states = len(matrices["A"])
     for name, shape in (("B", (states, 1)), ("C", (1, states))):
-        if matrices[name].ndim < 2:
+        # scipy writes an array of one dimension into a .mat file as a row, or as a column.
+        if matrices[name].ndim < 2 or matrices[name].shape == shape[::-1]:
             if matrices[name].size != states:
                 raise DesignError(
                     f"{name} has {matrices[name].size} elements and A {states} rows: expected a matrix of "
@@ -119,7 +120,8 @@ def _entries(a: Any, b: Any, c: Any, d: Any = 0.0) -> dict[str, Any]:
     feedthrough = numpy.asarray(d, dtype=float)
     if feedthrough.any():
         size = (len(matrices["C"]), matrices["B"].shape[1])
-        if feedthrough.ndim < 2 and feedthrough.size == size[0] * size[1] and 1 in size:
+        is_vector = feedthrough.ndim < 2 or feedthrough.shape == size[::-1]
+        if is_vector and feedthrough.size == size[0] * size[1] and 1 in size:
             feedthrough = feedthrough.reshape(size)
         matrices["D"] = feedthrough
     return {name: matrix.tolist() for name, matrix in matrices.items()}

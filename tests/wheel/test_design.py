@@ -85,6 +85,20 @@ def test_matrices_alone_get_names_and_a_linear_system_is_accepted():
     assert all(np.array_equal(third.gains[name], first.gains[name]) for name in first.gains)
 
 
+@pytest.mark.parametrize("kind", ["row", "column"])
+def test_a_vector_in_a_mat_file_is_a_column_of_b_and_a_row_of_c(tmp_path, kind):
+    io = pytest.importorskip("scipy.io")
+    a, b, c = [[0.0, 1.0], [-2.0, -3.0]], [0.0, 1.0], [1.0, 0.0]
+    requirements = {
+        "feedback": {"eigenvalues": [-2.0, -4.0]},
+        "observer": {"eigenvalues": [-8.0, -9.0, -10.0]},
+        "actuator_faults": "all",
+    }
+    io.savemat(tmp_path / "plant.mat", {"A": a, "B": b, "C": c}, oned_as=kind)
+    of_file = af.design(tmp_path / "plant.mat", **requirements)
+    assert of_file.report["gains"] == af.design((a, b, c), **requirements).report["gains"]
+
+
 def test_the_controller_fmu_runs(design, tmp_path):
     path = design.controller.fmu(tmp_path / "Own.fmu")
     names = {variable.name for variable in af.read_model_description(path).variables}
