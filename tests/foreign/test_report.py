@@ -573,6 +573,22 @@ def test_values_between_empty_cells_are_drawn_as_points_or_held(aso_ftc, write, 
 
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_the_label_of_each_tick_is_its_value_also_of_a_single_one(aso_ftc, write, tmp_path):
+    report(aso_ftc, write("own.csv", frame()))
+    single = [(12.1, 12.91), (0.21, 0.291), (-0.291, -0.21), (1.7e9 + 0.21, 1.7e9 + 0.291)]
+    several = [(0.0, 1.0), (0.0, 3e6), (1e-7, 5e-7), (1.7e9, 1.7e9 + 10), (1.7e9, 1.7e9 + 0.004)]
+    script = "((places) => [places, ticks.labels(places, {0}, {1}, 4, false)])(ticks.places({0}, {1}, 4, false))"
+    with browser(tmp_path / "profile") as page:
+        page.open((tmp_path / "own.html").as_uri())
+        for low, high in single + several:
+            places, labels = page.evaluate(script.format(low, high))
+            assert (len(places) == 1) == ((low, high) in single)
+            assert [float(label.replace("−", "-")) for label in labels] == pytest.approx(places, rel=1e-15, abs=1e-6 * (high - low))
+        # Seconds since 1970 in as many letters as they have digits.
+        assert page.evaluate(script.format(1.7e9, 1.7e9 + 10))[1][1] == "1700000005"
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_rows_at_one_time_are_drawn_also_where_times_are_seconds_apart(aso_ftc, write, tmp_path):
     with browser(tmp_path / "profile") as page:
         # The next number after 1e15 is 0.125 away, that after 1e17 is 16 away.

@@ -32,11 +32,13 @@ const ticks = (() => {
 
   /* Texts with the digits that tell each tick from its neighbours. */
   function linearLabels(places) {
-    const step = places.length > 1 ? places[1] - places[0] : Math.abs(places[0]) || 1;
+    if (places.length === 1) return [minus(String(Number(places[0].toPrecision(15))))];
+    const step = places[1] - places[0];
     const largest = Math.max(...places.map(Math.abs));
     return places.map((value) => {
       if (Math.abs(value) < 0.5 * step) return "0";
-      if (largest >= 1e6 || step < 1e-4) {
+      /* All digits of seconds since 1970 are shorter than a power of ten with as many. */
+      if ((largest >= 1e6 && step >= 1e5) || step < 1e-4) {
         const digits = Math.floor(Math.log10(Math.abs(value))) - Math.floor(Math.log10(step));
         return minus(value.toExponential(Math.min(Math.max(digits, 0), 15)));
       }
