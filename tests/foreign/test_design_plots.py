@@ -215,6 +215,31 @@ def test_the_keyboard_moves_the_cursor_and_zooms(designed, opened):
     assert legend(opened, "step-1-2")[0] > 0.98 * places[-1]
 
 
+def test_a_vertical_axis_with_decades_zooms_out_to_the_smallest_number_and_the_page_goes_on(opened):
+    show(opened, "frequency-1")
+    x, y = place(opened, "frequency-1", 0.5)
+    top = y - 0.45 * opened.evaluate("document.querySelector('#frequency-1 .u-over').clientHeight")
+    for _ in range(40):
+        mouse(opened, "mouseWheel", (x, top), deltaX=0, deltaY=100, modifiers=8)
+    mouse(opened, "mouseMoved", (x, y))
+    assert all(value > 0 for value in legend(opened, "frequency-1"))
+
+
+def test_zoomed_out_by_keys_at_the_end_of_an_axis_there_is_not_more_than_everything(opened):
+    # Places of pixels are rounded.
+    script = """([low, high], isLogarithmic, part) => {
+        const axis = new LinkedAxis({ name: 'end', isLogarithmic, whole: [low, high] });
+        axis.zoomAbout({
+            cursor: { left: 1 }, over: { clientHeight: 1 }, scales: { x: { min: low, max: high } },
+            posToVal: () => high * part, valToPos: () => 1, setCursor: () => undefined,
+        }, 2);
+        return axis.range;
+    }"""
+    for ends, is_logarithmic in (([0, 10], "false"), ([0.001, 300], "true")):
+        for part in (1 - 1e-15, 1, 1 + 1e-15):
+            assert opened.evaluate(f"({script})({ends}, {is_logarithmic}, {part!r})") is None
+
+
 def test_plots_are_drawn_when_they_come_into_view_and_all_of_them_for_paper(opened):
     count = "document.querySelectorAll('.uplot canvas').length"
     everything = opened.evaluate("document.querySelectorAll('.plot').length")

@@ -74,6 +74,11 @@ function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
+/* Whether an axis can show a range: the range has a length, and that of a logarithmic axis does not reach 0. */
+function isRange([low, high], isLogarithmic) {
+  return high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high)) && (low > 0 || !isLogarithmic);
+}
+
 /* A horizontal axis that several plots have in common. */
 class LinkedAxis {
   /* `name` tells axes apart; `whole` is the range of all plots, by default each plot shows its own;
@@ -89,7 +94,7 @@ class LinkedAxis {
   /* Shows a range in all plots; null: everything, and the whole vertical axes. */
   show(range) {
     if (range === null) this.heights.clear();
-    if (range !== null && !(range[1] - range[0] > 1e-12 * Math.max(...range.map(Math.abs)))) return;
+    if (range !== null && !isRange(range, this.isLogarithmic)) return;
     this.range = range;
     for (const plot of this.plots) this.apply(plot);
     this.changed(range ?? this.common);
@@ -125,7 +130,7 @@ class LinkedAxis {
   /* Zooms the vertical axis of a plot; null: all values. */
   showVertical(plot, range) {
     if (range === null) this.heights.delete(plot);
-    else if (range[1] - range[0] > 1e-12 * Math.max(...range.map(Math.abs))) this.heights.set(plot, range);
+    else if (isRange(range, plot.scales.y.distr === 3)) this.heights.set(plot, range);
     this.apply(plot);
   }
 
@@ -359,7 +364,9 @@ class LinkedAxis {
     const at = this.cursor(plot);
     const next = this.moved([plot.scales.x.min, plot.scales.x.max], 0, size, at);
     const [low, high] = this.whole(plot);
-    this.show(low >= next[0] && next[1] >= high ? null : next);
+    /* With the cursor at one end, this end is rounded. */
+    const slack = 1e-9 * (high - low);
+    this.show(low + slack >= next[0] && next[1] >= high - slack ? null : next);
     this.moveCursor(plot, at);
   }
 
