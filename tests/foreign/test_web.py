@@ -5,6 +5,7 @@ import csv
 import gzip
 import io
 import json
+import re
 import tomllib
 from contextlib import contextmanager
 from urllib.parse import quote
@@ -578,6 +579,36 @@ def test_a_results_file_dropped_on_the_page_is_drawn(open_page):
         "(() => { const box = document.getElementById('file-status').getBoundingClientRect();"
         "return box.top >= 0 && box.bottom <= innerHeight; })()"
     )
+
+
+def labels(page):
+    """A function that returns the numbers that plots have had as labels since this call."""
+    page.evaluate(
+        """window.drawn = [];
+        CanvasRenderingContext2D.prototype.fillText = function (text) { window.drawn.push(text); };
+        0"""
+    )
+    return lambda: [float(text) for text in page.evaluate("window.drawn") if re.fullmatch(r"-?[\d.]+(e-?\d+)?", text)]
+
+
+def test_small_values_and_seconds_since_1970_of_a_file_have_their_digits(open_page):
+    page = open_page()
+    drawn = labels(page)
+    times = [1.7e9 + k / 4 for k in range(9)]
+    shown(page, "small.csv", ("time,a\n" + "".join(f"{time},{k}e-6\n" for k, time in enumerate(times))).encode())
+    assert any(0 < label < 1e-5 for label in drawn()), "uPlot's own labels are all 0"
+    page.evaluate("document.querySelector('#dropped .u-over').scrollIntoView({block: 'center'})")
+    ((x, y),) = page.places("#dropped .u-over", [0.4])
+    page.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+    frame = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    assert float(page.evaluate(f"{frame}.then(() => document.querySelector('#dropped .u-value').textContent)")) in times[1:]
+
+
+def test_an_infinite_value_of_a_file_is_a_gap_and_the_axis_is_that_of_the_others(open_page):
+    page = open_page()
+    drawn = labels(page)
+    shown(page, "infinite.csv", b"time,a\n0,1001\n1,Infinity\n2,1003\n3,1002\n4,-Infinity\n5,1001\n")
+    assert any(1001 < label < 1003 for label in drawn())
 
 
 TABLES: dict[str, tuple[bytes, dict[str, list[float]]]] = {

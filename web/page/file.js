@@ -4,6 +4,16 @@ const MOST_AT_FIRST = 6; // plots
 let reader = null; // the worker
 let shown = null; // {axis, plots, times, redraw}
 
+// Numbers with all of their digits, such as seconds since 1970 and currents in A; uPlot's own labels have three decimals, and
+// its places for those of an axis of time are 50 px wide.
+const write = (value) => (value === null || value === undefined ? "" : `${Number(value.toPrecision(15))}`);
+const labels = (self, places) => places.map(write);
+const AXES = {
+  x: { values: labels, space: (self, index, low, high) => Math.max(50, 28 + 7 * write(Math.trunc(Math.max(-low, high))).length) },
+  y: { values: labels, size: (self, texts) => Math.max(52, 17 + 7 * Math.max(0, ...(texts ?? []).map((text) => text.length))) },
+  write: (value) => write(value) || "–",
+};
+
 // Asks the worker; `progress` gets parts from 0 to 1.
 function ask(message, progress = () => {}) {
   return new Promise((done, failed) => {
@@ -50,7 +60,7 @@ export async function showFile(file, place, status) {
   function draw(name) {
     const entry = plots.get(name);
     const label = units[name] ? `${name} in ${units[name]}` : name;
-    entry.plot = new TimePlot(axis, entry.element, times, [{ label, ink: "--ink-1", column: entry.column }]);
+    entry.plot = new TimePlot(axis, entry.element, times, [{ label, ink: "--ink-1", column: entry.column }], AXES);
   }
 
   function redraw() {
@@ -77,7 +87,8 @@ export async function showFile(file, place, status) {
     try {
       const { values } = await read(name);
       if (plots.get(name)?.element !== element) return;
-      plots.get(name).column = new Column(values, values.length);
+      // No place of a plot is infinite: a gap.
+      plots.get(name).column = new Column(values.map((value) => (Number.isFinite(value) ? value : NaN)), values.length);
       draw(name);
     } catch (error) {
       say(`${file.name}, ${name}: ${error.message}`, true);

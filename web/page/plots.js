@@ -108,9 +108,9 @@ function colour(name) {
 const digits = (value) => (value === null || value === undefined ? "–" : Number(value.toPrecision(6)).toString());
 
 // A plot over time. `curves`: {label, ink, column, scale, dash}; `band`: a range to shade; `marks`: a function that
-// returns times to mark; `wide`: the vertical axis is wide near 0.
+// returns times to mark; `wide`: the vertical axis is wide near 0; `x`, `y`: more about the axes; `write`: the text of a time.
 class TimePlot {
-  constructor(axis, place, times, curves, { unit = "", height = 200, band = null, marks = () => [], wide = false } = {}) {
+  constructor(axis, place, times, curves, { unit = "", height = 200, band = null, marks = () => [], wide = false, x = {}, y = {}, write = digits } = {}) {
     Object.assign(this, { axis, place, times, curves, height });
     const style = { stroke: colour("--text"), grid: { stroke: colour("--grid") }, ticks: { stroke: colour("--grid") } };
     const decades = (self, index, low, high) => [-1000, -100, -10, -1, 0, 1, 10, 100, 1000].filter((value) => value >= low && value <= high);
@@ -133,9 +133,9 @@ class TimePlot {
       height,
       plugins: [{ hooks: { drawClear: shade, drawAxes: mark } }],
       scales: { x: { time: false }, y: wide ? { distr: 4, asinh: 1, range: (self, low, high) => [Math.min(low ?? 0, -2) * 1.3, Math.max(high ?? 0, 2) * 1.3] } : {} },
-      axes: [{ ...style, size: 34 }, { ...style, size: 52, label: unit || undefined, labelSize: 20, ...(wide ? { splits: decades, filter: (self, places) => places } : {}) }],
+      axes: [{ ...style, size: 34, ...x }, { ...style, size: 52, label: unit || undefined, labelSize: 20, ...(wide ? { splits: decades, filter: (self, places) => places } : {}), ...y }],
       series: [
-        { label: "t in s", value: (self, value) => digits(value) },
+        { label: "t in s", value: (self, value) => write(value) },
         ...curves.map(({ label, ink, dash, column, width = 1.5 }) => ({
           label, dash, stroke: colour(ink), width, value: (self, value) => digits(value),
           // A value between gaps is a point.
