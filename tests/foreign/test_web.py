@@ -246,6 +246,47 @@ def test_a_change_at_the_time_of_a_row_after_a_step_back_is_that_of_the_command(
     equal(results, of_the_command(aso_ftc, page, tmp_path))
 
 
+def test_a_step_back_over_a_change_takes_it_back_in_the_run_too(aso_ftc, open_page, tmp_path):
+    page = open_page("#stop=2&t_on=1")
+    for steps, end in ((55, 0.545), (10, 0.595)):
+        page.evaluate(f"for (let k = 0; k < {steps}; k += 1) document.getElementById('step').click()")
+        page.until(f"{NEWEST} > {end}")
+        click(page, "back")
+        page.until(f"{NEWEST} < 0.505")
+        if steps == 55:
+            state(page, "F_c", "15")
+    assert page.evaluate("document.getElementById('set-F_c').value") == "25"
+    results = rows(run_to_the_end(page))
+    assert "[[scenario.set]]" not in page.evaluate("document.getElementById('native').textContent")
+    equal(results, of_the_command(aso_ftc, page, tmp_path))
+
+
+def test_a_push_ends_with_its_button_also_if_the_run_is_paused_or_has_ended(open_page):
+    page = open_page("#stop=60")
+    native = "document.getElementById('native').textContent"
+
+    def button(kind):
+        page.evaluate(f"document.getElementById('right').dispatchEvent(new PointerEvent('{kind}'))")
+
+    click(page, "play")
+    page.until(f"{NEWEST} > 0.1")
+    button("pointerdown")
+    page.until(f"{native}.includes('value = 40\\n')", limit=10)
+    click(page, "play")
+    button("pointerup")
+    page.until(f"{native}.includes('value = 0\\n')", limit=10)
+    state(page, "stop", "1")
+    click(page, "play")
+    page.until(f"{NEWEST} > 0.1")
+    button("pointerdown")
+    page.until(f"{STATUS}.startsWith('The run ended')")
+    button("pointerup")
+    click(page, "play")
+    page.until(f"{NEWEST} > 0.1 && {NEWEST} < 0.9")
+    button("pointerdown")
+    page.until(f"{native}.includes('value = 40\\n')", limit=10)
+
+
 def test_every_control_answers(open_page):
     page = open_page("#stop=20&nonsense=1")
     assert "unknown setting nonsense" in page.evaluate(STATUS)

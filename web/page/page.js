@@ -140,7 +140,7 @@
   function restart(go, moves = []) {
     number += 1;
     begun = { ...values };
-    [changes, plan, isToRun, time, last] = [[], moves, go, 0, null];
+    [changes, plan, isToRun, time, last, pushed] = [[], moves, go, 0, null, 0];
     rms = { next: 0, sum: 0, count: 0 };
     plots.clear();
     showState("starting");
@@ -249,9 +249,10 @@
   let pushed = 0;
   function push(force) {
     if (force !== 0 && state !== "running") say("A push acts while the run goes on.");
-    if (force === pushed || state !== "running") return;
-    pushed = force;
-    set("plant.f_a", force);
+    else if (force !== pushed) {
+      pushed = force;
+      if (state !== "ended") set("plant.f_a", force);
+    }
   }
   for (const [name, sign] of [["left", -1], ["right", 1]]) {
     const button = id(name);
@@ -415,6 +416,8 @@
       showState("ready");
       showRow(plots.cut(data.at));
       changes = changes.filter(({ at }) => at < data.at);
+      pushed = present({ variable: "plant.f_a" }) ?? 0;
+      if (plan.length === 0) push(0); // nobody presses a button
       for (const field of FIELDS.filter(({ at, variable }) => at === "now" && variable)) values = { ...values, [field.id]: present(field) };
       rms.next = Infinity;
       for (const column of Object.values(plots.ghost)) column.cut(0);

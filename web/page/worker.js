@@ -167,6 +167,8 @@ const actions = {
   set({ line }) {
     if (!run) return;
     run.moves = run.plan = [];
+    // A state of this time is one without the change, as those of the plan.
+    if (!run.ended) save();
     change(line);
   },
 };
