@@ -652,6 +652,22 @@ def test_an_infinite_value_of_a_file_is_a_gap_and_the_axis_is_that_of_the_others
     assert any(1001 < label < 1003 for label in drawn())
 
 
+def test_a_file_is_read_that_is_dropped_while_a_variable_of_another_one_is(open_page):
+    page = open_page()
+    shown(page, "first.csv", b"time,a\n0,1\n1,2\n")
+    # A worker that has not answered yet.
+    page.evaluate(
+        """window.post = Worker.prototype.postMessage;
+        import('./file.js').then((file) => {
+          Worker.prototype.postMessage = () => {};
+          file.values('a');
+          return Promise.resolve();
+        }).then(() => { Worker.prototype.postMessage = window.post; })"""
+    )
+    names, read = shown(page, "second.csv", b"time,b\n0,3\n1,4\n")
+    assert names == ["b"] and list(read("b")) == [3, 4]
+
+
 TABLES: dict[str, tuple[bytes, dict[str, list[float]]]] = {
     "semicolon.csv": (b"time;a;b\n0;1;2\n1;2;3\n", {"time": [0, 1], "a": [1, 2], "b": [2, 3]}),
     "comma.CSV": (b"time;a\r\n0,0;1,5\r\n0,1;-1,7e-1\r\n", {"time": [0, 0.1], "a": [1.5, -0.17]}),

@@ -38,6 +38,7 @@ function read(name) {
 export async function showFile(file, place, status) {
   const say = (text, bad = false) => Object.assign(status, { textContent: text, className: bad ? "bad" : "" });
   reader?.terminate();
+  last = Promise.resolve(); // the answers to what was asked before do not come
   reader = new Worker("file-worker.js", { type: "module" });
   for (const { plot } of shown?.plots.values() ?? []) plot?.remove();
   shown = null;
