@@ -624,6 +624,15 @@ def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
     assert again.startswith(results) and results.count(b"\n") > 500
 
 
+@pytest.mark.skipif(not CHROMIUM, reason="no Chromium is installed")
+def test_the_page_shows_times_in_seconds_since_1970_with_all_digits(tmp_path):
+    with live(None, "--start-time", "1.7e9", "--stop-time", "1700000060") as run, browser(tmp_path / "profile") as page:
+        page.open(run.url)
+        page.until("document.body.dataset.ready === 'true' && document.body.dataset.phase === 'paused'")
+        page.evaluate("document.getElementById('step').click()")
+        page.until("document.getElementById('time').textContent === '1700000000.001 of 1700000060 s'", limit=10)
+
+
 class Tunnel:
     """A way to the page that can be broken and mended."""
 

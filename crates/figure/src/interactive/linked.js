@@ -205,7 +205,7 @@ class LinkedAxis {
     };
     const cell = reader === null
       ? (self, value, curve) => (value === null || value === undefined
-        ? "–" : write(value) + (this.second === null ? "" : difference(value, second(self, curve))))
+        ? "–" : write(value, curve) + (this.second === null ? "" : difference(value, second(self, curve))))
       : (self, value, curve) => reader.text(self, curve);
     const line = ({ dots, holds }) => {
       if (dots) return () => null;

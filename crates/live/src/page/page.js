@@ -29,6 +29,9 @@
   const element = (name, text) => Object.assign(document.createElement(name), { textContent: text });
   const digits = (value) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(6))));
 
+  // A time in s with all digits down to 1 µs, also of seconds since 1970.
+  const instant = (time) => (time === null || Math.abs(time) < 1 ? digits(time) : String(Number(time.toFixed(6))));
+
   // Numbers in a sentence, without the rounding errors of sums.
   const rounded = (text) => text.replace(/\d+\.\d{9,}/gu, (number) => String(Number(Number(number).toPrecision(9))));
 
@@ -157,7 +160,7 @@
       curves: members.map(({ signal }, k) =>
         ({ name: names[k], colour: `--ink-${k + 1}`, dots: campaign, holds: facts.signals[signal].kind !== "Real" })),
       marks: interventions,
-      write: digits,
+      write: (value, curve) => (curve === 0 ? instant : digits)(value),
       name: `${names.join(", ")} over ${campaign ? "the runs" : "time"}`,
     });
     const observer = new ResizeObserver(() => plot.setSize({ width: Math.max(figure.clientWidth, 200), height: 220 }));
@@ -209,7 +212,7 @@
     const { time, steps, seconds } = state;
     const length = facts.stop - facts.start;
     field("progress").value = length > 0 ? (time - facts.start) / length : 0;
-    say("time", campaign ? `${time} of ${facts.stop}` : `${digits(time)} of ${digits(facts.stop)} s`);
+    say("time", campaign ? `${time} of ${facts.stop}` : `${instant(time)} of ${instant(facts.stop)} s`);
     say("steps", String(steps));
     say("mean", seconds > 0 ? ((time - facts.start) / seconds).toPrecision(3) : "–");
     speeds.push([seconds, time]);
