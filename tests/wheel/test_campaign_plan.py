@@ -236,6 +236,14 @@ def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):
 
 
 @pytest.mark.parametrize(
+    "text",
+    ["at(a.x, fault_start)", "at(a.x, fault_start + 1)", "max(a.x, start=fault_start)", "last(a.x, end=fault_start)", "first_time(time > fault_start)"],
+)
+def test_a_measure_from_the_start_of_a_fault_is_nan_in_the_run_without_one(text):
+    assert np.isnan(Expression("m", text).value(SIGNALS, TIME, {}, np.nan))
+
+
+@pytest.mark.parametrize(
     "entries, words",
     [
         ({"parameters": {"plant.F_q": [1.0]}}, "parameters.plant.F_q"),
