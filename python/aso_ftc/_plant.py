@@ -14,8 +14,10 @@ if TYPE_CHECKING:
 
 __all__ = ["of_file", "of_system", "stated", "with_names"]
 
-# The part of the largest element below which an element of a realisation counts as rounding.
+# The part of an eigenvalue below which the distance from its conjugate counts as rounding.
 _ROUNDING = 1e-10
+# The part of C, or of A, below which a further row of an observable part counts as rounding.
+_DEPENDENT = 1e-8
 # What a file has: a plant, and the time of a sample in s.
 _MATRICES = ("A", "B", "C", "D", "F_a", "Ts")
 _NAMES = (("states", "A", 0, "x"), ("actuators", "B", 1, "u"), ("measurements", "C", 0, "y"))
@@ -140,6 +142,12 @@ def _realisation(numerators: Any, denominators: Any) -> tuple[NDArray[Any], ...]
         for j in range(inputs):
             a, b, c, d = signal.tf2ss(numerators[i][j], denominators[i][j])
             feedthrough[i, j] = d.item()
+            if outputs * inputs > 1:
+                # The companion form has rows and columns of very different lengths.
+                whole = numpy.block([[a, b], [c, numpy.zeros((1, 1))]])
+                _, (scale, _) = linalg.matrix_balance(whole, permute=False, separate=True)
+                scale = scale[:-1] / scale[-1]
+                a, b, c = a * scale / scale[:, None], b / scale[:, None], c * scale
             blocks.append((a, b @ numpy.eye(1, inputs, j), numpy.eye(outputs, 1, -i) @ c))
     a = linalg.block_diag(*(block[0] for block in blocks))
     b, c = numpy.vstack([block[1] for block in blocks]), numpy.hstack([block[2] for block in blocks])
@@ -150,15 +158,18 @@ def _realisation(numerators: Any, denominators: Any) -> tuple[NDArray[Any], ...]
 
 
 def _observable(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> tuple[NDArray[Any], ...]:
-    """Return the part that the outputs see: its states are the row space of the observability matrix."""
+    """Return the part that the outputs see: its states are the row space of C, C A, C A^2, ...
+
+    Of each product only what is new counts, so that slow modes do not vanish beside powers of fast ones.
+    """
     import numpy
 
-    scaled = a / max(numpy.linalg.norm(a, 2), numpy.finfo(float).tiny)
-    rows = [c / numpy.linalg.norm(c, 2)]
-    for _ in range(len(a) - 1):
-        rows.append(rows[-1] @ scaled)
-    _, sizes, basis = numpy.linalg.svd(numpy.vstack(rows))
-    part = basis[: int((sizes > _ROUNDING * sizes[0]).sum())]
+    part, rows, size = numpy.zeros((0, len(a))), c, numpy.linalg.norm(c, 2)
+    while len(rows):
+        _, sizes, basis = numpy.linalg.svd(rows - rows @ part.T @ part, full_matrices=False)
+        new = basis[sizes > _DEPENDENT * size]
+        new = numpy.linalg.qr((new - new @ part.T @ part).T)[0].T
+        part, rows, size = numpy.vstack([part, new]), new @ a, numpy.linalg.norm(a, 2)
     return part @ a @ part.T, part @ b, c @ part.T
 
 

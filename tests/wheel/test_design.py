@@ -8,6 +8,7 @@ from pathlib import Path
 import aso_ftc as af
 import numpy as np
 import pytest
+from aso_ftc._plant import of_system
 
 ROOT = Path(__file__).resolve().parents[2]
 PLANT = ROOT / "fmu-controller" / "pendulum.toml"
@@ -187,6 +188,18 @@ def test_a_transfer_function_of_several_inputs_has_its_poles_once_and_its_respon
     assert sorted(design.plant.poles().real.round(6)) == [-3.0, -2.0, -2.0, -1.0, -1.0]
     for s in 1j * np.logspace(-1, 1, 5):
         assert np.allclose(design.plant(s), plant(s), rtol=1e-8)
+
+
+def test_transfer_functions_of_several_inputs_keep_slow_poles_beside_fast_ones():
+    control = pytest.importorskip("control")
+    slow = [[(1, 0.1), (2, 0.05)], [(3, 0.2), (5, 0.01)]]
+    denominators = [[np.poly([-1e4, -first, -second]) for first, second in row] for row in slow]
+    plant = control.tf([[[1e4], [2e4]], [[1e4], [3e4]]], denominators)
+    a, b, c = (np.array(of_system(plant)[name]) for name in "ABC")
+    # McMillan degree: each slow pole once, the fast one twice.
+    assert len(a) == 10
+    for s in 1j * np.logspace(-3, 3, 13):
+        assert np.allclose(c @ np.linalg.solve(s * np.eye(10) - a, b), plant(s), rtol=1e-6)
 
 
 def test_the_loop_is_that_of_python_control(servo):
