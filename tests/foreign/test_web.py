@@ -673,6 +673,7 @@ TABLES: dict[str, tuple[bytes, dict[str, list[float]]]] = {
     "comma.CSV": (b"time;a\r\n0,0;1,5\r\n0,1;-1,7e-1\r\n", {"time": [0, 0.1], "a": [1.5, -0.17]}),
     "tab.txt": (b"a\ttime\n1\t0\n2\t1\n", {"time": [0, 1], "a": [1, 2]}),
     "units.csv": (b"time,a\ns,m\n0,1\n1,2\n", {"time": [0, 1], "a": [1, 2]}),
+    "units-of-1.csv": (b"time,a,b\n[s],[m],1\n0,1,2\n1,2,3\n", {"time": [0, 1], "a": [1, 2], "b": [2, 3]}),
     "bom.csv": (b"\xef\xbb\xbftime,a\n0,1\n1,2\n", {"time": [0, 1], "a": [1, 2]}),
     "utf16.csv": ("\ufefftime,a\n0,1\n1,2\n".encode("utf-16-le"), {"time": [0, 1], "a": [1, 2]}),
     "zipped.csv.gz": (gzip.compress(b"time,a\n0,1\n1,2\n"), {"time": [0, 1], "a": [1, 2]}),

@@ -67,7 +67,7 @@ async function openCsv(file, begin) {
     }
     const time = number(parts[place], isComma);
     if (time !== time) {
-      if (count === 0 && Object.keys(units).length === 0 && parts.every((part) => Number.isNaN(number(part, isComma)))) {
+      if (count === 0 && Object.keys(units).length === 0 && (/^[[(]?s[\])]?$/.test(parts[place].trim()) || parts.every((part) => Number.isNaN(number(part, isComma))))) {
         names.forEach((name, k) => { units[name] = parts[k].trim(); });
         return;
       }
