@@ -235,7 +235,7 @@ def test_zoomed_out_by_keys_at_the_end_of_an_axis_there_is_not_more_than_everyth
         }, 2);
         return axis.range;
     }"""
-    for ends, is_logarithmic in (([0, 10], "false"), ([0.001, 300], "true")):
+    for ends, is_logarithmic in (([0, 10], "false"), ([0.001, 300], "true"), ([1e-9, 1e3], "true")):
         for part in (1 - 1e-15, 1, 1 + 1e-15):
             assert opened.evaluate(f"({script})({ends}, {is_logarithmic}, {part!r})") is None
 

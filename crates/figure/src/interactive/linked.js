@@ -363,10 +363,9 @@ class LinkedAxis {
   zoomAbout(plot, size) {
     const at = this.cursor(plot);
     const next = this.moved([plot.scales.x.min, plot.scales.x.max], 0, size, at);
-    const [low, high] = this.whole(plot);
     /* With the cursor at one end, this end is rounded. */
-    const slack = 1e-9 * (high - low);
-    this.show(low + slack >= next[0] && next[1] >= high - slack ? null : next);
+    const [low, high] = this.moved(this.whole(plot), 0, 1 - 1e-9);
+    this.show(low >= next[0] && next[1] >= high ? null : next);
     this.moveCursor(plot, at);
   }
 
