@@ -275,16 +275,33 @@ def test_a_push_ends_with_its_button_also_if_the_run_is_paused_or_has_ended(open
     click(page, "play")
     button("pointerup")
     page.until(f"{native}.includes('value = 0\\n')", limit=10)
-    state(page, "stop", "1")
+    state(page, "stop", "2")
+    page.evaluate("document.getElementById('speed').value = '1'")
     click(page, "play")
     page.until(f"{NEWEST} > 0.1")
     button("pointerdown")
     page.until(f"{STATUS}.startsWith('The run ended')")
     button("pointerup")
     click(page, "play")
-    page.until(f"{NEWEST} > 0.1 && {NEWEST} < 0.9")
+    page.until(f"{NEWEST} > 0.1 && {NEWEST} < 1.5")
     button("pointerdown")
     page.until(f"{native}.includes('value = 40\\n')", limit=10)
+
+
+def test_each_step_back_during_a_push_is_earlier(open_page):
+    page = open_page("#stop=60&push=5")
+    released = "document.getElementById('native').textContent.includes('value = 0\\n')"
+    click(page, "play")
+    page.until(f"{NEWEST} > 0.1")
+    page.evaluate("document.getElementById('right').dispatchEvent(new PointerEvent('pointerdown'))")
+    page.until(f"{NEWEST} > 3.2")
+    click(page, "play")
+    click(page, "back")
+    page.until(f"{STATUS}.startsWith('Back at') && {released}", limit=10)
+    for _ in range(2):
+        before = page.evaluate(NEWEST)
+        click(page, "back")
+        page.until(f"{NEWEST} < {before} && {released}", limit=10)
 
 
 def test_every_control_answers(open_page):

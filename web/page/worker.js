@@ -154,10 +154,13 @@ const actions = {
   back() {
     pause();
     if (!run) return;
+    const from = wasm.time();
     if (wasm.back() !== 0) {
       answer({ kind: "refused", text: readText(wasm) });
       return;
     }
+    // A change, also the end of a push after a step back, saves the state of its time again.
+    if (wasm.time() === from) wasm.back();
     run.saved = -Infinity;
     run.ended = false;
     run.plan = run.moves.filter(({ at }) => at >= wasm.time());
