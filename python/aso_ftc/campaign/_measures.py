@@ -85,9 +85,8 @@ def _mean(window: _Window, x: Any) -> float:
 def _at(window: _Window, x: Any, t: Any) -> float:
     """The value at the last row up to the time t; NaN if t is NaN."""
     moment = float(t)
-    after = int(np.searchsorted(window.time, moment + 1e-9 * max(1.0, abs(moment)), "right"))
-    row = -1 if np.isnan(moment) else after - 1
-    return float(window.of(x)[row]) if row >= 0 else np.nan
+    row = int(np.searchsorted(window.time, moment + 1e-9 * max(1.0, abs(moment)), "right")) - 1
+    return float(window.of(x)[row]) if row >= 0 and not np.isnan(moment) else np.nan
 
 
 def _first_time(window: _Window, condition: Any) -> float:
