@@ -416,8 +416,10 @@
       showState("ready");
       showRow(plots.cut(data.at));
       changes = changes.filter(({ at }) => at < data.at);
-      pushed = present({ variable: "plant.f_a" }) ?? 0;
-      if (plan.length === 0) push(0); // nobody presses a button
+      if (plan.length === 0) { // nobody presses a button
+        pushed = present({ variable: "plant.f_a" }) ?? 0;
+        push(0);
+      }
       for (const field of FIELDS.filter(({ at, variable }) => at === "now" && variable)) values = { ...values, [field.id]: present(field) };
       rms.next = Infinity;
       for (const column of Object.values(plots.ghost)) column.cut(0);
