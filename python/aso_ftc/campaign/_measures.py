@@ -33,11 +33,17 @@ PAPER_CLAIMS = {
 }
 
 
+def _slack(time: float) -> float:
+    """The largest difference in s of two equal times: at most 1 us, or four last places, in seconds since 1970."""
+    size = max(1.0, abs(time))
+    return max(min(1e-9 * size, 1e-6), 4.0 * np.finfo(float).eps * size)
+
+
 class _Window:
     """The rows of a run from ``start`` to ``end``, both in s and included."""
 
     def __init__(self, time: Signal, start: float | None, end: float | None) -> None:
-        slack = 1e-9 * max(1.0, abs(float(time[-1]))) if len(time) else 0.0
+        slack = _slack(float(time[-1])) if len(time) else 0.0
         low = 0 if start is None else int(np.searchsorted(time, start - slack, "left"))
         high = len(time) if end is None else int(np.searchsorted(time, end + slack, "right"))
         # NaN, the start of a fault that a run does not have, is no time.
@@ -85,7 +91,7 @@ def _mean(window: _Window, x: Any) -> float:
 def _at(window: _Window, x: Any, t: Any) -> float:
     """The value at the last row up to the time t; NaN if t is NaN."""
     moment = float(t)
-    row = int(np.searchsorted(window.time, moment + 1e-9 * max(1.0, abs(moment)), "right")) - 1
+    row = int(np.searchsorted(window.time, moment + _slack(moment), "right")) - 1
     return float(window.of(x)[row]) if row >= 0 and not np.isnan(moment) else np.nan
 
 
