@@ -16,8 +16,10 @@ __all__ = ["of_file", "of_system", "stated", "with_names"]
 
 # The part of an eigenvalue below which the distance from its conjugate counts as rounding.
 _ROUNDING = 1e-10
-# The part of C, or of A, below which a further row of an observable part counts as rounding.
-_DEPENDENT = 1e-8
+# The parts of C, or of A, below which a further row of an observable part counts as rounding: the first one that leaves
+# the response as it is, up to _CHANGE of its largest value.
+_DEPENDENT = (1e-8, 1e-10, 1e-12)
+_CHANGE = 1e-7
 # What a file has: a plant, and the time of a sample in s.
 _MATRICES = ("A", "B", "C", "D", "F_a", "Ts")
 _NAMES = (("states", "A", 0, "x"), ("actuators", "B", 1, "u"), ("measurements", "C", 0, "y"))
@@ -151,13 +153,34 @@ def _realisation(numerators: Any, denominators: Any) -> tuple[NDArray[Any], ...]
             blocks.append((a, b @ numpy.eye(1, inputs, j), numpy.eye(outputs, 1, -i) @ c))
     a = linalg.block_diag(*(block[0] for block in blocks))
     b, c = numpy.vstack([block[1] for block in blocks]), numpy.hstack([block[2] for block in blocks])
-    if len(blocks) > 1:
-        a, b, c = _observable(a, b, c)
-        a, c, b = (matrix.T for matrix in _observable(a.T, c.T, b.T))
-    return a, b, c, feedthrough
+    return *(_minimal(a, b, c) if len(blocks) > 1 else (a, b, c)), feedthrough
 
 
-def _observable(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+def _minimal(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+    """Return a realisation of the same transfer functions without the states that no input or no output has."""
+    import numpy
+
+    # Next to the eigenvalues, where each mode shows; in no direction in which eigenvalues usually are.
+    sizes = numpy.abs(numpy.linalg.eigvals(a))
+    points = numpy.exp(1.3j) * numpy.unique(sizes[sizes > 0])
+
+    def response(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> NDArray[Any]:
+        return numpy.array([c @ numpy.linalg.solve(s * numpy.eye(len(a)) - a, b) for s in points])
+
+    expected = response(a, b, c)
+    for tolerance in _DEPENDENT:
+        part = _observable(a, b, c, tolerance)
+        dual = _observable(part[0].T, part[2].T, part[1].T, tolerance)
+        reduced = dual[0].T, dual[2].T, dual[1].T
+        change = numpy.abs(response(*reduced) - expected)
+        if (change <= _CHANGE * numpy.abs(expected).max(axis=0, initial=0.0)).all():
+            return reduced
+    return a, b, c
+
+
+def _observable(
+    a: NDArray[Any], b: NDArray[Any], c: NDArray[Any], tolerance: float
+) -> tuple[NDArray[Any], ...]:
     """Return the part that the outputs see: its states are the row space of C, C A, C A^2, ...
 
     Of each product only what is new counts, so that slow modes do not vanish beside powers of fast ones.
@@ -167,7 +190,7 @@ def _observable(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> tuple[NDAr
     part, rows, size = numpy.zeros((0, len(a))), c, numpy.linalg.norm(c, 2)
     while len(rows):
         _, sizes, basis = numpy.linalg.svd(rows - rows @ part.T @ part, full_matrices=False)
-        new = basis[sizes > _DEPENDENT * size]
+        new = basis[sizes > tolerance * size]
         new = numpy.linalg.qr((new - new @ part.T @ part).T)[0].T
         part, rows, size = numpy.vstack([part, new]), new @ a, numpy.linalg.norm(a, 2)
     return part @ a @ part.T, part @ b, c @ part.T

@@ -202,6 +202,15 @@ def test_transfer_functions_of_several_inputs_keep_slow_poles_beside_fast_ones()
         assert np.allclose(c @ np.linalg.solve(s * np.eye(10) - a, b), plant(s), rtol=1e-6)
 
 
+def test_transfer_functions_keep_poles_eight_decades_slower_than_others():
+    control = pytest.importorskip("control")
+    numerators = [[[1e4], [1e-4]], [[1e4], [3e-4]]]
+    plant = control.tf(numerators, [[[1, 1e4], [1, 1e-4]], [[1, 1e4], [1, 2e-4]]])
+    a, b, c = (np.array(of_system(plant)[name]) for name in "ABC")
+    for s in 1j * np.logspace(-6, 6, 13):
+        assert np.allclose(c @ np.linalg.solve(s * np.eye(len(a)) - a, b), plant(s), rtol=1e-6)
+
+
 def test_the_loop_is_that_of_python_control(servo):
     control = pytest.importorskip("control")
     plant, law = servo.plant, servo.controller.system
