@@ -236,14 +236,20 @@ def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):
 
 
 def test_a_measure_in_seconds_since_1970_ends_at_its_time():
-    for text in ("at(time, 1700000000.5)", "last(time, end=1700000000.5)"):
-        assert Expression("m", text).value({}, 1.7e9 + TIME, {}, np.nan) == pytest.approx(1.7e9 + 0.5, rel=0, abs=1e-6)
-    assert Expression("m", "first(time, start=1700000000.5)").value({}, 1.7e9 + TIME, {}, np.nan) == pytest.approx(1.7e9 + 0.5, rel=0, abs=1e-6)
+    for text in ("at(time, 1700000000.5)", "last(time, end=1700000000.5)", "first(time, start=1700000000.5)"):
+        value = Expression("m", text).value({}, 1.7e9 + TIME, {}, np.nan)
+        assert value == pytest.approx(1.7e9 + 0.5, rel=0, abs=1e-6)
 
 
 @pytest.mark.parametrize(
     "text",
-    ["at(a.x, fault_start)", "at(a.x, fault_start + 1)", "max(a.x, start=fault_start)", "last(a.x, end=fault_start)", "first_time(time > fault_start)"],
+    [
+        "at(a.x, fault_start)",
+        "at(a.x, fault_start + 1)",
+        "max(a.x, start=fault_start)",
+        "last(a.x, end=fault_start)",
+        "first_time(time > fault_start)",
+    ],
 )
 def test_a_measure_from_the_start_of_a_fault_is_nan_in_the_run_without_one(text):
     assert np.isnan(Expression("m", text).value(SIGNALS, TIME, {}, np.nan))
