@@ -57,9 +57,9 @@ impl fmt::Display for TrialResult {
 #[derive(Debug, Serialize)]
 pub(super) struct ToolRefusal {
     tool: Tool,
-    /// The first finding that stops the tool.
+    /// The first finding for which the tool refuses the FMU.
     reason: String,
-    /// Number of further findings that stop the tool.
+    /// Number of further such findings.
     more: usize,
 }
 

@@ -57,7 +57,7 @@ pub(super) fn check<S: Slave>(
 
 struct Trial<'a, S> {
     description: &'a ModelDescription,
-    /// Number of steps of the first two instances.
+    /// Number of steps of each of the two instances whose outputs are compared.
     count: u32,
     make: &'a mut MakeInstance<'a, S>,
     /// Result of the first instance.
