@@ -18,7 +18,8 @@ const LARGE: f64 = 40.0;
 const REDUCED: f64 = 20.0;
 /// The largest threshold that is tried.
 const LARGEST: f64 = 1e6;
-/// Twice the mean excess of a sum of standard normal steps over a distant limit: Siegmund (1985), (10.37).
+/// Twice the mean overshoot of a random walk with standard normal steps over a distant threshold: Siegmund (1985),
+/// (10.37).
 const EXCESS: f64 = 1.166;
 /// The largest run length computed from LU factors, with a relative error of about 1e-16 times the run length.
 const LONGEST: f64 = 1e12;
@@ -378,7 +379,8 @@ mod tests {
         assert!(delay < from_zero && delay > 0.6 * from_zero, "{delay} {from_zero}");
     }
 
-    /// Siegmund (1985): L = exp(h + 1.166) for both sums with a drift of 0.5.
+    /// Siegmund (1985): with a drift of 0.5 the mean number of samples between false alarms of the two-sided test is
+    /// about exp(h + 1.166).
     #[test]
     fn a_threshold_belongs_to_very_rare_false_alarms_too() {
         let [rare, rarest] =

@@ -72,9 +72,10 @@ impl ReducedPencil {
     }
 }
 
-/// Replaces u by the direction of T^-1 u; T: upper triangular, its diagonal at least eps, the unit of rounding.
+/// Replaces u by T^-1 u, scaled to length one; T: upper triangular, its diagonal at least eps, the unit of rounding.
 ///
-/// A chain of k states that no input reaches gives T^-1 entries of the size eps^-k.
+/// u is also scaled down on the way, so that it does not overflow: a chain of k states that no input reaches gives
+/// T^-1 entries of the size eps^-k.
 fn solve(t: &ComplexMatrix, u: &mut DVector<Complex<f64>>) {
     for i in (0..u.len()).rev() {
         u[i] /= t[(i, i)];

@@ -101,7 +101,7 @@ impl Windows {
         Ok(Self { past, inputs, outputs, count: range.len(), factor })
     }
 
-    /// Joins the windows of all parts, which must have the same signals and the same s.
+    /// Joins the windows of all parts, which must have the same signals and windows of the same length.
     ///
     /// # Errors
     ///

@@ -331,9 +331,9 @@ impl<'a> BoundProblem<'a> {
 
     /// The bound at `level`; None if P does not prove it in the units of the data.
     ///
-    /// P A and P B are sums `high` + `low`; the matrices of both parts are added after the large terms
-    /// have cancelled. The constant blocks appear in the matrices of the low part too and are
-    /// subtracted.
+    /// P A and P B have twice the precision, as sums `high` + `low`. The inequality is evaluated for `high`, where the
+    /// large terms cancel, then for `low`, and both matrices are added. The blocks of the level are in both matrices
+    /// and are therefore subtracted once.
     fn verified(&self, level: f64, p: &DMatrix<f64>) -> Result<Option<GainBound>, Error> {
         let (system, gamma) = (self.system, self.scaling.gamma(level));
         let p = self.coordinates.certificate(p) * self.scaling.certificate();

@@ -284,7 +284,8 @@ fn decays(intervals: &[Interval], p: &[Affine], rate: f64) -> Vec<Affine> {
     all
 }
 
-/// [`decays`] for known P, each times d + 1, rounded after the large terms have cancelled.
+/// The matrices of [`decays`] for a known P, computed with products of twice the precision, which are rounded after the
+/// large terms have cancelled. Each matrix is multiplied by d + 1, so that its weights are integers.
 fn accurate_decays(intervals: &[Interval], p: &[DMatrix<f64>], rate: f64) -> Vec<DMatrix<f64>> {
     let mut all = Vec::new();
     for (i, Interval { coefficients: a, length }) in intervals.iter().enumerate() {

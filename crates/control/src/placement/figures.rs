@@ -32,7 +32,7 @@ pub(crate) type Weighting<'a> = dyn Fn(&[f64; COUNT]) -> (f64, [f64; COUNT]) + '
 pub(crate) struct FeedbackLoop<'a> {
     /// The problem whose eigenvectors are chosen.
     pub(crate) problem: &'a AssignableSubspaces,
-    /// Columns X for which B X is orthonormal: the responses of the problem are in this basis.
+    /// X, for which the columns of B X are orthonormal: G is X times the responses of `problem`.
     basis: &'a DMatrix<f64>,
     b: &'a DMatrix<f64>,
     /// The points s, or z, of the frequencies; empty if a requested eigenvalue is unstable.

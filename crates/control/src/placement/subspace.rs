@@ -33,7 +33,7 @@ pub(crate) struct AssignableSubspace {
     /// X: orthonormal columns in the given coordinates, times the root of the number of eigenvalues, so that a w
     /// of length one gives eigenvectors of length one.
     pub(crate) states: DMatrix<f64>,
-    /// Y, in units of `response_scale`.
+    /// Y: the stacked columns of G are Y w, in units of `response_scale`.
     pub(crate) responses: DMatrix<f64>,
 }
 

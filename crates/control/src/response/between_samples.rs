@@ -136,7 +136,7 @@ impl<'a> Lifted<'a> {
         }
     }
 
-    /// The effects of f', with one value for each part: f in part j is f[k] + h times the sum of the earlier values.
+    /// The effects of f', constant in each part: in part j, f is f[k] + h times the sum of f' in earlier parts.
     fn rates(&self) -> Effects {
         let count = self.parts();
         let sum = |i: usize, r: usize| {

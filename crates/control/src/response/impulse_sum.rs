@@ -12,7 +12,7 @@ const LONGEST: u32 = 24;
 const HALVINGS: f64 = 12.0;
 /// Intervals that [`super::peak_gain`] needs for an impulse response, and for each of its oscillations.
 const INTERVALS: [f64; 2] = [500.0, 50.0];
-/// The number of lengths of these intervals.
+/// The number of different lengths of the intervals of `peak_gain`.
 const LENGTHS: f64 = 30.0;
 /// A sum is complete when the state is below this part, times the width, of the first state.
 const NEGLIGIBLE: f64 = 1e-9;

@@ -43,7 +43,7 @@ impl KnownResponse {
         Ok(Self { system, modes, transfer, known: HashMap::new() })
     }
 
-    /// The system with known responses at all [`Self::frequencies`] and [`Self::resonances`].
+    /// Computes and stores the responses at all [`Self::frequencies`] and [`Self::resonances`].
     pub(crate) fn swept(mut self) -> Result<Self, Error> {
         for frequency in self.frequencies().into_iter().chain(self.resonances()) {
             let response = self.transfer.without_direct(frequency)?;

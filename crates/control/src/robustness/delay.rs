@@ -168,8 +168,8 @@ pub(super) fn refine(
     Ok(period * narrow(start, end, value)?.0)
 }
 
-/// The longest delay, in samples, of `part` (above 0, below 1) and whole samples for which a sweep of frequencies shows
-/// that the loop is stable; minus infinity if the loop is unstable with the delay `part`.
+/// The longest delay, in samples, for which a sweep of frequencies shows that the loop is stable; minus infinity if the
+/// loop is unstable with the delay `part`. The delays examined are `part`, above 0 and below 1, plus whole samples.
 fn stable_delay(
     plant: &StateSpace,
     controller: &StateSpace,

@@ -6,7 +6,7 @@ use crate::svd::{Svd, norm_2};
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
-/// The largest number of commands with limits, of which all sets are examined.
+/// The largest number of commands with limits; every set of them is examined.
 const COMMANDS: usize = 10;
 /// Bisections of an interval.
 const BISECTIONS: usize = 12;
