@@ -38,7 +38,7 @@ pub(super) struct Decision {
     pub(super) loss: usize,
     /// The fraction of the command that the loss must exceed.
     pub(super) fraction: f64,
-    /// The number of samples for which the loss must exceed it.
+    /// The number of successive samples for which the loss must exceed the fraction.
     pub(super) samples: u32,
 }
 

@@ -143,7 +143,7 @@ macro_rules! kinds {
         }
 
         impl Kind {
-            /// The name of the constant with their number.
+            /// The name of the constant with the number of members of this kind.
             pub(super) fn plural(self) -> &'static str {
                 match self {
                     $(Self::$kind => $plural,)*

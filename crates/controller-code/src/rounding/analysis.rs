@@ -349,7 +349,8 @@ impl<'a> Analysis<'a> {
         numbers.clone_from_slice(&self.get(meaning).numbers());
     }
 
-    /// Sets `injected` to rho s / (|s| + delta): half the largest slope times s, plus v.
+    /// Sets `injected` to rho s / (|s| + delta), split into a linear part, half the largest slope times s, and an
+    /// input v.
     fn inject(&mut self, injected: &mut Elements) {
         let Some(SlidingMode { rho, delta }) = &self.controller.sliding_mode else { return };
         let s = self.get(Vector::S);
