@@ -17,8 +17,9 @@ use crate::design::schedule::Schedule;
 /// The place of a value in the grid.
 #[derive(Clone, Copy)]
 struct Place {
-    /// The interval, counted from 0, and the fraction of the interval that is below the value.
+    /// The index of the interval, from 0.
     interval: usize,
+    /// The position of the value in the interval, from 0 to 1.
     part: f64,
     /// Whether the value is within the grid, ends included.
     inside: bool,

@@ -78,7 +78,7 @@ pub struct Sets<'a, const ACTUATORS: usize> {
 /// The set of gains in force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Choice {
-    /// Its position.
+    /// The position of the set.
     pub set: u32,
     /// The number from 1 of the first actuator that is gone; 0 if there is none, -1 in the fall-back.
     pub reconfiguration: i32,
