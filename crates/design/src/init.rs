@@ -1,4 +1,4 @@
-//! Writes a plant file for matrices, an FMU or logs, with the bandwidths of a controller.
+//! Writes the plant file of a plant given by matrices, an FMU or logs, with bandwidths for feedback and observer.
 
 mod draft;
 mod fmu;

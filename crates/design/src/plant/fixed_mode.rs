@@ -10,9 +10,10 @@ pub(crate) fn has_rate(mode: &Mode) -> bool {
     mode.eigenvalue.re > 0.0 || mode.eigenvalue.im != 0.0
 }
 
-/// Returns `the eigenvalue -2 1/s, which x2 dominates`, with the eigenvalue in the plane in which the plant file states
-/// it: of the sampled loop if `sampled`, or without a rate, see [`has_rate`]; otherwise in 1/s. `name` returns the name
-/// of a state.
+/// Describes a mode, for example `the eigenvalue -2 1/s, which x2 dominates`.
+///
+/// In sampled time the eigenvalue is that of the sampled loop if `sampled`, or if it has no rate, see [`has_rate`];
+/// otherwise it is the rate in 1/s. `name` returns the name of a state.
 pub(crate) fn described_in(
     mode: &Mode,
     domain: Domain,

@@ -12,8 +12,8 @@ impl LoopModel<'_> {
     /// Returns feedback and observer whose loop has the lowest peaks of S, see [`least_sensitive`]; a single pair is
     /// returned without an examination.
     ///
-    /// `gains`: computes those of the controller from the gains of feedback and observer. A measurement filter belongs
-    /// to the plant, with integral action to the controller.
+    /// `gains` computes the gains of the controller from the gains of feedback and observer. A measurement filter is
+    /// part of the plant, or, with integral action, of the controller.
     pub(crate) fn chosen(
         self,
         feedback: GainResult,

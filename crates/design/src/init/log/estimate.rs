@@ -254,7 +254,8 @@ mod tests {
         Log { period: 1.0, inputs: Vec::new(), outputs: Vec::new(), record }
     }
 
-    /// Three quarters of 200 samples have 150 - 40 windows of 40 earlier samples; those of 52 have none.
+    /// Three quarters of 200 samples are 150: all but the first 40 end a window with 40 earlier samples. Three quarters
+    /// of 52 samples are too few for a window.
     #[test]
     fn blocks_have_the_windows_of_the_logs_that_are_long_enough() -> Result<(), control::Error> {
         let blocks = blocks(&[log(52), log(200)], 40)?;
