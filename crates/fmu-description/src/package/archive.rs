@@ -138,7 +138,7 @@ impl Archive {
         &self.names
     }
 
-    /// Returns a sentence for each tolerated rule on paths that entries break.
+    /// Returns a sentence for each tolerated fault of the paths: backslashes or `.`, and repeated names.
     pub(super) fn warnings(&self) -> Vec<String> {
         let sentence = |Renamed { count, stated, read }: &Renamed| {
             let entries = if *count == 1 { "entry has" } else { "entries have" };
