@@ -47,8 +47,8 @@ impl Instance {
     }
 }
 
-/// Calls a method of the instance in the version of its FMU, or of the listed part of it. In a version that is not listed,
-/// returns the error that `$absent` is missing.
+/// Calls a method of the instance, or of its field `$part`, if the FMI version of its FMU is listed. For other
+/// versions, returns the error that the C function `$absent` is missing.
 macro_rules! of_version {
     (
         $instance:ident.$method:ident $arguments:tt,

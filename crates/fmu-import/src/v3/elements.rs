@@ -359,8 +359,8 @@ impl Builder {
         self.ranges.get((index as usize).checked_sub(1)?).copied()
     }
 
-    /// Returns the new 1-based index of an element of the variable with the 1-based index `index`; `None` if the
-    /// variable does not exist or has no elements.
+    /// Returns the 1-based index, in the new description, of an element of the variable with the 1-based index `index`;
+    /// `None` if the variable does not exist or has no elements.
     fn moved(&self, index: u32, element: usize) -> Option<u32> {
         let (start, size) = self.range(index)?;
         if size == 0 {
