@@ -124,7 +124,7 @@ impl Builder {
     }
 }
 
-/// Returns a value, its square and its scaled square.
+/// Returns a value, its square, and the square of the value times [`SCALE`].
 fn with_squares(value: f64) -> [f64; 3] {
     [value, value * value, (value * SCALE) * (value * SCALE)]
 }
