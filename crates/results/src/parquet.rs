@@ -203,7 +203,8 @@ fn clocked(columns: &[Column]) -> Vec<Option<usize>> {
     std::iter::once(None).chain(columns.iter().map(number)).collect()
 }
 
-/// Writes the values of a column. A value whose level is 0 is null; without levels none is.
+/// Writes the values of a column. `levels` are their definition levels: 0 makes a value null. Without levels, no value
+/// is null.
 fn write<T: DataType>(
     writer: &mut ColumnWriterImpl<'_, T>,
     values: Option<&[T::T]>,
