@@ -32,14 +32,14 @@ impl Measure {
         }
     }
 
-    /// Creates the measure of the unit `name`, which the first of `scopes` with this name defines.
+    /// Creates the measure of the unit `name`, defined in the first of `scopes` that has it.
     pub(super) fn unit(name: &str, scopes: &[&Definitions]) -> Self {
         let mut all = scopes.iter().flat_map(|scope| &scope.units);
         let base = all.find(|unit| unit.name == name).map(|unit| unit.base);
         Measure { unit: Some((name.to_owned(), base)), ..Measure::default() }
     }
 
-    /// Creates the measure of the enumeration `name`, which the first of `scopes` with this name defines.
+    /// Creates the measure of the enumeration `name`, defined in the first of `scopes` that has it.
     pub(super) fn enumeration(name: &str, scopes: &[&Definitions]) -> Self {
         let mut all = scopes.iter().flat_map(|scope| &scope.enumerations);
         let items = all.find(|known| known.name == name).map(|known| known.items.clone());
