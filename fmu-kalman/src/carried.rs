@@ -293,7 +293,7 @@ impl CarriedPlant {
         }
     }
 
-    /// Sets slope `at` of a step to z' at `time` and `point`.
+    /// Sets `slopes[at]` to z' at `time` and z = `point`.
     fn set_slope(&mut self, at: usize, time: f64) -> Result<(), LineariseError> {
         let point = std::mem::take(&mut self.point);
         self.set_inputs(&point);
@@ -313,7 +313,8 @@ impl CarriedPlant {
         self.equations.jacobian(time, &z[..self.n], &self.inputs, &mut self.jacobian)
     }
 
-    /// Sets the derivative of slope `at` by the z at which the prediction began, `tangent` being that of the point.
+    /// Sets `tangents[at]`, the derivative of `slopes[at]` by the z at which the prediction starts, from `tangent`, the
+    /// derivative of `point`.
     fn set_tangent(&mut self, at: usize, time: f64) -> Result<(), LineariseError> {
         let point = std::mem::take(&mut self.point);
         let done = self.set_jacobian(time, &point);
