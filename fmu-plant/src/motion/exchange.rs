@@ -40,8 +40,8 @@ struct Instant<'a> {
     motion: &'a Motion,
     /// The nominal value of the force in N.
     nominal: f64,
-    /// How far in N the force on a held cart exceeds the static friction at its break-away: more than the damping of a
-    /// cart at the threshold of rest, so that a stopped cart is held.
+    /// How far in N the force on a held cart exceeds the static friction when the cart breaks away. With static
+    /// friction this is more than the damping of a cart at the velocity [`LANDING`], so that a stopped cart is held.
     excess: f64,
     /// Whether there is static friction, so that a cart can be held.
     holds: bool,
