@@ -31,15 +31,15 @@ pub(crate) fn supervise(options: &run::Options) -> Option<ExitCode> {
     }
 }
 
-/// Returns the exit status of the command. Reports an unexpected end of the process of the run. Unless this process
+/// Returns the exit status of the command. Reports an unexpected end of the process of the run. Unless the run
 /// chose a status other than 0, also completes its results file and reports that.
 fn judge(ended: &Ended) -> u8 {
     let status = judge_end(ended);
     if !has_chosen_end(ended) {
         fmu_description::package::remove_abandoned_folders();
     }
-    let has_reported = ended.status.is_some_and(|status| status != 0);
-    let file = supervise::memory().filter(|_| !has_reported).and_then(results::ledger::complete);
+    let chose_error = ended.status.is_some_and(|status| status != 0);
+    let file = supervise::memory().filter(|_| !chose_error).and_then(results::ledger::complete);
     let Some(file) = file else { return status };
     let path = file.path.display();
     if let Some(damage) = file.damage {

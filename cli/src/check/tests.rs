@@ -39,7 +39,7 @@ enum Fault {
     Silent,
     NoEnd,
     Nan,
-    EachOtherwise,
+    InstancesDiffer,
     SecondEndsEarlier,
     LostState,
     RoundedState,
@@ -121,7 +121,7 @@ impl Slave for Sum {
             return Err(refused("fmi2DoStep", "past the end"));
         }
         self.y += self.u * size;
-        if self.fault == Fault::EachOtherwise {
+        if self.fault == Fault::InstancesDiffer {
             self.y += f64::from(self.number);
         }
         if self.fault == Fault::Nan {
@@ -204,7 +204,7 @@ fn each_fault_is_found_with_its_section() {
         (Fault::Silent, Warning, "fmi2GetReal", "without a message", "2.1.3"),
         (Fault::NoEnd, Warning, "fmi2DoStep", "past a stopTime", "2.1.6"),
         (Fault::Nan, Warning, "variable y", "no finite number after 1 steps", "2.2.7"),
-        (Fault::EachOtherwise, Warning, "fmi2DoStep", "has other outputs, from step 1", "2.1"),
+        (Fault::InstancesDiffer, Warning, "fmi2DoStep", "has other outputs, from step 1", "2.1"),
         (Fault::SecondEndsEarlier, Warning, "fmi2DoStep", "other outputs, from step 5", "2.1"),
         (Fault::LostState, Error, "fmi2SetFMUstate", "differ from those before", "2.1.8"),
         (Fault::LostState, Error, "fmi2DeSerializeFMUstate", "differ", "2.1.8"),
