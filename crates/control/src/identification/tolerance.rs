@@ -70,16 +70,16 @@ pub fn equivalent_tolerance(
     Ok(2.0 * (variance / sensitivity).sqrt())
 }
 
-/// The positions of the varying entries of A, B, C or D; `number`: the matrix, from 0.
+/// The positions of the entries of A, B, C or D (`number` 0 to 3) that vary: no zeros, no rows of C with a single 1.
 fn varying(model: &StateSpace, number: usize) -> Vec<(usize, usize)> {
     let matrix = [&model.a, &model.b, &model.c, &model.d][number];
     let is_zero = |value: f64| value.abs() <= 0.0;
-    let is_state = |row: usize| {
+    let is_exact = |row: usize| {
         let entries = matrix.row(row).iter().filter(|entry| !is_zero(**entry)).count();
         number == 2 && entries == 1 && is_zero(matrix.row(row).sum() - 1.0)
     };
     let entries = (0..matrix.nrows()).flat_map(|row| (0..matrix.ncols()).map(move |c| (row, c)));
-    entries.filter(|&(row, column)| !is_zero(matrix[(row, column)]) && !is_state(row)).collect()
+    entries.filter(|&(row, column)| !is_zero(matrix[(row, column)]) && !is_exact(row)).collect()
 }
 
 /// The frequency responses in units of the signals.

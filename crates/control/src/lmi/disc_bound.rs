@@ -103,11 +103,11 @@ struct InverseRange {
 }
 
 impl InverseRange {
-    /// The logarithm of the largest product of 1 / (1 + a v) for `count` numbers v of the range with the sum `sum`.
-    fn largest_log(&self, sum: f64, a: f64) -> f64 {
+    /// The logarithm of the largest product of 1 / (1 + s v) for `count` numbers v of the range with the sum `sum`.
+    fn largest_log(&self, sum: f64, s: f64) -> f64 {
         let free = (sum - self.count * self.least).max(0.0);
         let width = self.largest - self.least;
-        let log = |v: f64| -(a * v).ln_1p();
+        let log = |v: f64| -(s * v).ln_1p();
         let at_end = if width.is_finite() && width > 0.0 { (free / width).floor() } else { 0.0 };
         if at_end >= self.count {
             return self.count * log(self.largest);
@@ -121,20 +121,20 @@ impl InverseRange {
 /// The lower bound of the norm that the two bounds with H in [`disc_norm_lower_bound`] give together; `sizes`: the q
 /// singular values of E B.
 fn by_zeros(eigenvalues: &InverseRange, zeros: &[Complex<f64>], sizes: &DVector<f64>) -> f64 {
-    let (least, inverses) = (sizes.min(), sizes.map(f64::recip).sum());
+    let (sigma_min, inverse_sum) = (sizes.min(), sizes.map(f64::recip).sum());
     let inputs = as_number(sizes.len());
     let zeta = zeros.iter().map(|zero| (-1.0 / zero).re).sum::<f64>();
-    let by_trace = |sum: f64| (zeta - sum) / inverses;
+    let by_trace = |sum: f64| (zeta - sum) / inverse_sum;
     let by_points = |sum: f64| {
-        let bound_at = |a: f64| {
-            let of_zeros =
-                zeros.iter().fold(Complex::new(1.0, 0.0), |all, zero| all * (1.0 - a / zero));
-            let log = of_zeros.re.max(0.0).ln() + eigenvalues.largest_log(sum, a);
-            least * (1.0 - (log / inputs).exp()) / a
+        let bound_at = |s: f64| {
+            let numerator =
+                zeros.iter().fold(Complex::new(1.0, 0.0), |all, zero| all * (1.0 - s / zero));
+            let log_determinant = numerator.re.max(0.0).ln() + eigenvalues.largest_log(sum, s);
+            sigma_min * (1.0 - (log_determinant / inputs).exp()) / s
         };
-        let rate = 1.0 / eigenvalues.least.max(f64::MIN_POSITIVE);
+        let centre = 1.0 / eigenvalues.least.max(f64::MIN_POSITIVE);
         (-POINTS..=POINTS)
-            .map(|point| bound_at(rate * 10.0_f64.powf(f64::from(point) / PER_DECADE)))
+            .map(|point| bound_at(centre * 10.0_f64.powf(f64::from(point) / PER_DECADE)))
             .fold(0.0, f64::max)
     };
     let [mut low, mut high] =

@@ -124,27 +124,27 @@ fn coefficients(
     }
     let sum = denominator.iter().skip(1).fold(denominator[0].clone(), |sum, one| &sum + one);
     problem.constrain(&(&Affine::identity(1, 1.0) - &sum), 0.0);
-    for &(square, magnitude) in points {
-        let scale = 1.0 / (1.0 + square).powi(i32::try_from(order).unwrap_or(2));
-        let value = |all: &[Affine], factor: f64| {
-            let mut power = scale * factor;
+    for &(w_squared, m_squared) in points {
+        let scale = 1.0 / (1.0 + w_squared).powi(i32::try_from(order).unwrap_or(2));
+        let value = |all: &[Affine], gain: f64| {
+            let mut power = scale * gain;
             let mut sum = Affine::zeros(1, 1);
             for coefficient in all {
                 sum = &sum + &(coefficient * power);
-                power *= square;
+                power *= w_squared;
             }
             sum
         };
-        let (n, d) = (value(&numerator, 1.0 / magnitude), value(&denominator, 1.0));
+        let (n, d) = (value(&numerator, 1.0 / m_squared), value(&denominator, 1.0));
         problem.constrain(&(&(&d * factor) - &n), 0.0);
         problem.constrain(&(&(&n * factor) - &d), 0.0);
     }
     let Outcome::Optimal(solution) = problem.solve()? else { return Ok(None) };
-    let root = |all: &[Affine]| {
+    let factored = |all: &[Affine]| {
         let values: Vec<_> = all.iter().map(|one| solution.value(one)[(0, 0)]).collect();
         spectral_factor(&values)
     };
-    Ok(Some((root(&numerator), root(&denominator))))
+    Ok(Some((factored(&numerator), factored(&denominator))))
 }
 
 /// The polynomial b in p, the highest power first, with roots in the left half plane and |b(j w)|^2 =

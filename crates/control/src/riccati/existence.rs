@@ -49,15 +49,15 @@ pub(super) fn require_closed(
 /// Checks that every mode on the stability limit appears in Q, at the points of the limit nearest to `eigenvalues`.
 fn require_weights(problem: &ScaledProblem, eigenvalues: &[Complex<f64>]) -> Result<(), Error> {
     let (a, domain) = (&problem.decoupled_a, problem.equation.domain);
-    let least_weight = smallest_weight(a, &problem.decoupled_q);
+    let lower_bound = smallest_weight(a, &problem.decoupled_q);
     for eigenvalue in eigenvalues.iter().filter(|eigenvalue| eigenvalue.im >= 0.0) {
-        // The point of the imaginary axis, or of the unit circle, nearest to the eigenvalue.
         let limit = match domain {
             Domain::Continuous => Complex::new(0.0, eigenvalue.im),
             Domain::Sampled { .. } => Complex::from_polar(1.0, eigenvalue.arg()),
         };
-        let largest = 2.0 * a.norm() + limit.norm();
-        let appears = least_weight > tolerance(a) * largest;
+        // Bounds of the singular values of [A - lambda I; Q] that show full rank without a decomposition.
+        let upper_bound = 2.0 * a.norm() + limit.norm();
+        let appears = lower_bound > tolerance(a) * upper_bound;
         if !appears && is_deficient(a, &problem.decoupled_q, limit)? {
             return Err(Error::Unweighted { weight: "Q", eigenvalue: limit });
         }

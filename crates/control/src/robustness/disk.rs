@@ -95,7 +95,7 @@ pub fn disk_margin(closed: &Loop, at: Point, channel: Option<usize>) -> Result<D
     margin_of(KnownResponse::new(system)?)
 }
 
-/// The disk margin of the channels with this S.
+/// The disk margin of the channels with this S: (S - T) / 2 = S - I / 2, and D of S is I.
 pub(super) fn margin_of(sensitivity: KnownResponse) -> Result<DiskMargin, Error> {
     let half = &sensitivity.system.d * 0.5;
     let peak = peak_of(&sensitivity.with_direct(half))?;

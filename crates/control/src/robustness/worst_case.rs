@@ -20,7 +20,7 @@ const LARGE: usize = 50;
 /// Relative shift of the eigenvalue in the inverse iteration.
 const SHIFT: f64 = 1e-9;
 
-/// Returns the worst case that the search reaches from `start`.
+/// Returns the worst case reached from `start` by moving the deviations with the largest gradients to their limits.
 pub(super) fn climb<F: PlantFamily>(
     loops: &ToleranceSearch<'_, F>,
     start: ToleranceCase,
@@ -32,15 +32,15 @@ pub(super) fn climb<F: PlantFamily>(
         if worst.instability.is_infinite() {
             break;
         }
-        let count = if round == 0 { MODES } else { 1 };
+        let modes = if round == 0 { MODES } else { 1 };
         let mut improved = false;
-        for gradient in gradients(loops, &worst.deviations, count)? {
+        for gradient in gradients(loops, &worst.deviations, modes)? {
             let mut order: Vec<usize> = (0..gradient.len()).collect();
             order.sort_by(|i, j| gradient[*j].abs().total_cmp(&gradient[*i].abs()));
-            let mut count = gradient.len();
-            while count > 0 {
+            let mut moved = gradient.len();
+            while moved > 0 {
                 let mut deviations = worst.deviations.clone();
-                for &at in &order[..count] {
+                for &at in &order[..moved] {
                     if gradient[at].abs() > 0.0 {
                         deviations[at] = gradient[at].signum();
                     }
@@ -50,7 +50,7 @@ pub(super) fn climb<F: PlantFamily>(
                     (worst, improved) = (ToleranceCase { instability, deviations }, true);
                     break;
                 }
-                count /= if large { FEWER_IF_LARGE } else { FEWER };
+                moved /= if large { FEWER_IF_LARGE } else { FEWER };
             }
         }
         if !improved {

@@ -13,11 +13,11 @@ pub(super) fn form(
     m: &ComplexMatrix,
     d: &ComplexMatrix,
     g: &ComplexMatrix,
-    bound: f64,
+    beta: f64,
 ) -> ComplexMatrix {
-    let (adjoint, turned) = (m.adjoint(), g.map(|x| x * Complex::i()));
-    let left = times(&adjoint, d) + &turned;
-    d.scale(bound * bound) - times(&left, m) + times(&adjoint, &turned)
+    let (adjoint, j_g) = (m.adjoint(), g.map(|x| x * Complex::i()));
+    let left = times(&adjoint, d) + &j_g;
+    d.scale(beta * beta) - times(&left, m) + times(&adjoint, &j_g)
 }
 
 /// The sums of the moduli of the terms in each diagonal entry of [`form`]: its rounding errors are relative to them.
@@ -25,12 +25,12 @@ pub(super) fn form_size(
     m: &ComplexMatrix,
     d: &ComplexMatrix,
     g: &ComplexMatrix,
-    bound: f64,
+    beta: f64,
 ) -> Vec<f64> {
     let [m, d, g] = [m, d, g].map(|matrix| matrix.map(Complex::norm));
     let (of_d, of_g) = (&d * &m, &g * &m);
     let size = |at: usize| {
-        bound * bound * d[(at, at)] + m.column(at).dot(&of_d.column(at)) + 2.0 * of_g[(at, at)]
+        beta * beta * d[(at, at)] + m.column(at).dot(&of_d.column(at)) + 2.0 * of_g[(at, at)]
     };
     (0..m.ncols()).map(size).collect()
 }

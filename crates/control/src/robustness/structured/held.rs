@@ -183,23 +183,23 @@ impl<'a> HeldFamily<'a> {
     /// The channels in the order of the blocks, and the blocks: all channels of a deviation together, then the channels
     /// of the error.
     fn places(&self, stages: usize) -> (Vec<usize>, Vec<Block>) {
-        let (of_states, of_outputs) = (&self.on_states.ranks, &self.on_outputs.ranks);
-        let (all, outputs) = (self.on_states.left.ncols(), self.on_outputs.left.ncols());
+        let (state_ranks, output_ranks) = (&self.on_states.ranks, &self.on_outputs.ranks);
+        let (per_stage, outputs) = (self.on_states.left.ncols(), self.on_outputs.left.ncols());
         let (mut places, mut blocks) = (Vec::new(), Vec::new());
-        let (mut state, mut output) = (0, 0);
-        for (states, measured) in of_states.iter().zip(of_outputs) {
-            let stage = |stage: usize| stage * all + state..stage * all + state + states;
-            places.extend((0..stages).flat_map(stage));
-            places.extend((stages * all + output)..(stages * all + output + measured));
-            (state, output) = (state + states, output + measured);
-            if stages * states + measured > 0 {
-                blocks.push(Block::Real(stages * states + measured));
+        let (mut first_state, mut first_output) = (0, 0);
+        for (state_rank, output_rank) in state_ranks.iter().zip(output_ranks) {
+            let in_stage = |stage: usize| (stage * per_stage + first_state..).take(*state_rank);
+            places.extend((0..stages).flat_map(in_stage));
+            places.extend((stages * per_stage + first_output..).take(*output_rank));
+            (first_state, first_output) = (first_state + state_rank, first_output + output_rank);
+            if stages * state_rank + output_rank > 0 {
+                blocks.push(Block::Real(stages * state_rank + output_rank));
             }
         }
         let inner = self.z.nrows();
-        let first = stages * all + outputs;
+        let first_error = stages * per_stage + outputs;
         if self.size.amax() > 0.0 {
-            places.extend(first..first + inner);
+            places.extend(first_error..first_error + inner);
             blocks.push(Block::Full(inner));
         }
         (places, blocks)
