@@ -147,7 +147,7 @@ impl<'a> Analysis<'a> {
         entry.map_or_else(zero, |(_, elements)| elements.clone())
     }
 
-    /// A bound of the elements of a vector, from the largest deviations of the signals.
+    /// Bounds of the elements of a vector: rows of coefficients of the largest deviations of the signals, and of 1.
     fn magnitude(&self, vector: Vector) -> DMatrix<f64> {
         let mut magnitude = match vector {
             Vector::StoredXR | Vector::NextXR => return self.state_of_filter.clone(),
@@ -169,16 +169,16 @@ impl<'a> Analysis<'a> {
             Vector::Y | Vector::StoredYF | Vector::YF | Vector::NextYF => self.measured(),
             _ => self.unit(vector.kind()),
         };
-        let operating = match vector {
+        let signals = match vector {
             Vector::StoredXHat | Vector::XValue | Vector::NextXHat => &self.controller.states,
             Vector::StoredYF | Vector::Measured | Vector::NextYF => &self.controller.measurements,
             Vector::Command => &self.controller.actuators,
             Vector::Referred => &self.controller.references,
             _ => return magnitude,
         };
-        let last = magnitude.ncols() - 1;
-        for (i, signal) in operating.iter().enumerate() {
-            magnitude[(i, last)] += signal.operating.abs();
+        let constant = magnitude.ncols() - 1;
+        for (i, signal) in signals.iter().enumerate() {
+            magnitude[(i, constant)] += signal.operating.abs();
         }
         magnitude
     }
