@@ -122,16 +122,16 @@ impl<'a> Loops<'a> {
         let positions: Vec<_> = self.outputs.iter().map(|output| output.row).collect();
         let mut peaks = vec![Err(Missing::Time); positions.len()];
         // The errors do not depend on x: their system is smaller.
-        let states = self.designed.linear.plant_states().len();
-        let (of_states, of_errors) = peaks.split_at_mut(states);
-        let (states, errors) = positions.split_at(states);
-        let mut parts: Vec<_> = [(of_errors, errors), (of_states, states)]
+        let state_count = self.designed.linear.plant_states().len();
+        let (of_states, of_errors) = peaks.split_at_mut(state_count);
+        let (state_rows, error_rows) = positions.split_at(state_count);
+        let mut batches: Vec<_> = [(of_errors, error_rows), (of_states, state_rows)]
             .into_iter()
             .flat_map(|(places, rows)| {
                 places.rchunks_mut(OUTPUTS_AT_ONCE).zip(rows.rchunks(OUTPUTS_AT_ONCE))
             })
             .collect();
-        for at_once in parts.chunks_mut(rayon::current_num_threads()) {
+        for at_once in batches.chunks_mut(rayon::current_num_threads()) {
             if budget.is_over() {
                 break;
             }

@@ -21,7 +21,7 @@ const LARGEST_ORDER: usize = 30;
 pub(crate) fn certificate(designed: &Solution, norms: Vec<Norm>, budget: &Budget) -> Certificate {
     Certificate {
         printed: printed(designed),
-        free: in_time(budget, || free(designed)),
+        free: in_time(budget, || with_p_from_inequalities(designed)),
         ultimate: in_time(budget, || ultimate(designed)),
         norms,
     }
@@ -99,7 +99,7 @@ fn verified<T>(outcome: Result<Outcome<T>, control::Error>) -> Result<T, String>
     }
 }
 
-fn free(designed: &Solution) -> Result<FreeP, String> {
+fn with_p_from_inequalities(designed: &Solution) -> Result<FreeP, String> {
     solvable(designed)?;
     let dynamics = designed.gains.error_dynamics(&designed.plant);
     let decay = verified(largest_decay(&dynamics))?;

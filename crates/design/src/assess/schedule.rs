@@ -30,9 +30,9 @@ pub(crate) fn schedule(
 ) -> Result<Option<ScheduleReport>, crate::Error> {
     let Designed { nominal, schedule: Some(scheduled), .. } = designed else { return Ok(None) };
     let coupled = coupled(scheduled, nominal)?;
-    let all: Vec<_> = scheduled.points(nominal).collect();
+    let solutions: Vec<_> = scheduled.points(nominal).collect();
     let variable = &scheduled.variable;
-    let one = |(k, (at, point)): (usize, &(f64, &Solution))| {
+    let report_of = |(k, (at, point)): (usize, &(f64, &Solution))| {
         let name = format!("{} = {at}", variable.name);
         let linear = &point.linear;
         let report = member(point, linear, name.clone(), limits);
@@ -43,10 +43,10 @@ pub(crate) fn schedule(
                 .map(|all| all.iter().map(|signal| signal.operating.unwrap_or(0.0)).collect()),
             gains: gains(point),
             closed: report.map_err(|error| error.within(format!("schedule with {name}")))?,
-            coupled_instability: coupled.as_ref().map(|all| all[k]),
+            coupled_instability: coupled.as_ref().map(|values| values[k]),
         })
     };
-    let points = all.par_iter().enumerate().map(one).collect::<Result<Vec<_>, _>>()?;
+    let points = solutions.par_iter().enumerate().map(report_of).collect::<Result<Vec<_>, _>>()?;
     let whole = ScheduledLoop::of(scheduled, nominal)?;
     let intervals = whole.intervals()?;
     let (worst_instability, worst_at) = whole.worst(CHECKED, nominal.domain)?;
@@ -56,9 +56,9 @@ pub(crate) fn schedule(
     let named = |vertex: usize| {
         let (k, j) = (vertex / (degree + 1), vertex % (degree + 1));
         match j {
-            0 => all[k].0.to_string(),
-            j if j == degree => all[k + 1].0.to_string(),
-            _ => format!("{} to {}", all[k].0, all[k + 1].0),
+            0 => solutions[k].0.to_string(),
+            j if j == degree => solutions[k + 1].0.to_string(),
+            _ => format!("{} to {}", solutions[k].0, solutions[k + 1].0),
         }
     };
     let any_rate = common(&vertices, nominal.domain, budget, named)?;

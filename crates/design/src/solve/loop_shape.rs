@@ -74,22 +74,22 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let has_integrals = (self.gains)(feedback, observer).integral.is_some();
         let decay =
             if has_integrals && self.references.is_none() { DECAY_OF_INTEGRALS } else { DECAY };
-        let tune = |start: &[DMatrix<f64>; 2], is_start: bool| {
+        let tune = |start: &[DMatrix<f64>; 2], examine_only: bool| {
             let sizes = start.each_ref().map(sizes);
             let controller = |parameters: &DVector<f64>| {
                 let [feedback, observer] = self.divided(parameters, start);
                 self.controller(&units, &feedback, &observer)
             };
-            let of_estimates = |[feedback, observer]: &[DMatrix<f64>; 2]| {
+            let error_instability = |[feedback, observer]: &[DMatrix<f64>; 2]| {
                 let gains = (self.gains)(feedback, observer);
                 instability(&gains.error_dynamics(self.model.plant), self.model.domain)
             };
-            let slowest = DECAY_OF_ESTIMATES * of_estimates(start)?;
+            let slowest = DECAY_OF_ESTIMATES * error_instability(start)?;
             let is_allowed = |parameters: &DVector<f64>| {
                 let decays = |excess: Result<f64, Error>| excess.is_ok_and(|one| one <= slowest);
-                !has_integrals || decays(of_estimates(&self.divided(parameters, start)))
+                !has_integrals || decays(error_instability(&self.divided(parameters, start)))
             };
-            let start = &self.joined(start);
+            let initial = &self.joined(start);
             let mut tuning = Tuning {
                 plant: plant.clone(),
                 controller: &controller,
@@ -100,13 +100,13 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
                 rate: self.shape.bandwidth,
                 is_over: &is_over,
             };
-            let excess = instability(&tuning.dynamics(start)?, self.model.domain)?;
+            let excess = instability(&tuning.dynamics(initial)?, self.model.domain)?;
             tuning.instability = decay * excess.min(0.0);
-            if is_start {
-                let peak = tuning.peak(start)?;
-                return Ok(Tuned { parameters: start.clone(), peak });
+            if examine_only {
+                let peak = tuning.peak(initial)?;
+                return Ok(Tuned { parameters: initial.clone(), peak });
             }
-            tuning.tuned(start, &self.joined(&sizes))
+            tuning.tuned(initial, &self.joined(&sizes))
         };
         let mut examined = Vec::new();
         let mut refusal = None;
