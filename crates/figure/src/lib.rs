@@ -221,7 +221,7 @@ impl Panel<'_> {
     fn horizontal(&self, left: f64) -> Axis {
         let (start, end) = self.x_range.unwrap_or_else(|| self.times());
         let axis = |ticks| Axis::exact(start, end, (left, WIDTH - RIGHT), ticks);
-        // Long labels, such as those of seconds since 1970, leave room for fewer ticks.
+        // Labels, each a centre and half a width, must be apart: seconds since 1970 leave room for fewer ticks.
         let fits = |axis: &Axis| {
             let labels: Vec<_> = axis.ticks().iter().map(|tick| label_span(axis, tick)).collect();
             labels.windows(2).all(|pair| pair[0].0 + pair[0].1 < pair[1].0 - pair[1].1)
