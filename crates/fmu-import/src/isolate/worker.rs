@@ -64,17 +64,17 @@ pub fn worker_with(integrator: Integrator) -> Result<(), WorkerError> {
     run(Some(integrator))
 }
 
+/// Runs the worker. The master passes the shared memory as standard output and the connection as standard input.
 fn run(integrator: Option<Integrator>) -> Result<(), WorkerError> {
     IS_WORKER.store(true, Ordering::Relaxed);
-    let alone = |what| move |source| WorkerError::Alone { what, source };
-    let memory = stdout().as_fd().try_clone_to_owned().map_err(alone("no shared memory"))?;
-    let shared = Shared::attach(&File::from(memory)).map_err(alone("no shared memory"))?;
-    let shared = Arc::new(shared);
-    let socket = stdin().as_fd().try_clone_to_owned().map_err(alone("no connection"))?;
+    let error = |what| move |source| WorkerError::Alone { what, source };
+    let memory = stdout().as_fd().try_clone_to_owned().map_err(error("no shared memory"))?;
+    let shared = Arc::new(Shared::attach(&File::from(memory)).map_err(error("no shared memory"))?);
+    let socket = stdin().as_fd().try_clone_to_owned().map_err(error("no connection"))?;
     let socket = UnixStream::from(socket);
-    socket.peer_addr().map_err(alone("no connection"))?;
-    redirect_standard_streams().map_err(alone("no standard streams"))?;
-    end_with_master(&socket).map_err(alone("no thread to watch the connection"))?;
+    socket.peer_addr().map_err(error("no connection"))?;
+    redirect_standard_streams().map_err(error("no standard streams"))?;
+    end_with_master(&socket).map_err(error("no thread to watch the connection"))?;
     // Fails only if the program has set a subscriber, which then receives the messages.
     let _ = tracing::subscriber::set_global_default(Forward::new(shared.clone()));
     let observed = shared.clone();

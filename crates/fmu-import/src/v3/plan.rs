@@ -42,10 +42,10 @@ impl Plan {
     fn new(view: &ElementView, list: &[u32]) -> Result<Self, u32> {
         let mut runs: Vec<Run> = Vec::new();
         // For each variable its run and the place of its first element in the call.
-        let mut known: HashMap<usize, (usize, usize)> = HashMap::new();
+        let mut added: HashMap<usize, (usize, usize)> = HashMap::new();
         for (position, &reference) in list.iter().enumerate() {
             let (number, element) = view.locate(reference).ok_or(reference)?;
-            let (run, first) = *known.entry(number).or_insert_with(|| {
+            let (run, first) = *added.entry(number).or_insert_with(|| {
                 let run = run_for(&mut runs, &view.variables[number]);
                 (run, runs[run].add(&view.variables[number]))
             });
@@ -54,9 +54,9 @@ impl Plan {
         for run in &mut runs {
             let count = run.shadows.len();
             run.buffer = Buffer::new(run.kind, count);
-            let mut stated = vec![false; count];
-            run.places.iter().for_each(|(_, place)| stated[*place] = true);
-            run.partial = stated.contains(&false);
+            let mut is_listed = vec![false; count];
+            run.places.iter().for_each(|(_, place)| is_listed[*place] = true);
+            run.partial = is_listed.contains(&false);
         }
         Ok(Self { references: list.to_vec(), runs })
     }
