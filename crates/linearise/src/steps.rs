@@ -56,14 +56,14 @@ struct Discrete {
 }
 
 impl Discrete {
-    /// Returns `change` (0) or `outputs` (1) times [x; u] at the fraction `part` of the record.
-    fn times(&self, which: usize, part: f64, known: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut product = [&self.change, &self.outputs][which] * known;
-        let (powers, width) = (&self.powers[which], known.nrows());
-        let mut power = part;
+    /// Returns `change` (0) or `outputs` (1), a polynomial in time, at `fraction` of the record, times `x_u` = [x; u].
+    fn times(&self, which: usize, fraction: f64, x_u: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut product = [&self.change, &self.outputs][which] * x_u;
+        let (powers, width) = (&self.powers[which], x_u.nrows());
+        let mut power = fraction;
         for first in (0..powers.ncols()).step_by(width) {
-            product += powers.columns(first, width) * known * power;
-            power *= part;
+            product += powers.columns(first, width) * x_u * power;
+            power *= fraction;
         }
         product
     }
