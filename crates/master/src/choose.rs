@@ -200,21 +200,21 @@ fn default_extrapolation(system: &System, reasons: &mut Vec<String>) -> Extrapol
     receivers.sort_unstable();
     receivers.dedup();
     // FMI 3.0 has no canInterpolateInputs: an FMU asks for the inputs that have intermediateUpdate.
-    let is_third = |&k: &usize| system.slaves[k].1.description().version() == Version::V3;
-    let (third, others): (Vec<usize>, Vec<usize>) = receivers.into_iter().partition(is_third);
+    let is_fmi3 = |&k: &usize| system.slaves[k].1.description().version() == Version::V3;
+    let (fmi3, others): (Vec<usize>, Vec<usize>) = receivers.into_iter().partition(is_fmi3);
     let unable = |slaves: &[usize]| -> Vec<&str> {
         let can = |k: usize| system.can(k, |flags| flags.can_interpolate_inputs);
-        let unable = slaves.iter().filter(|&&k| !can(k));
-        unable.map(|&k| system.slaves[k].0.as_str()).collect()
+        let held = slaves.iter().filter(|&&k| !can(k));
+        held.map(|&k| system.slaves[k].0.as_str()).collect()
     };
-    let unable = [
+    let causes = [
         (unable(&others), "canInterpolateInputs is false"),
-        (unable(&third), "no input of theirs has intermediateUpdate"),
+        (unable(&fmi3), "no input of theirs has intermediateUpdate"),
     ];
-    let unable = unable.iter().filter(|(slaves, _)| !slaves.is_empty());
+    let causes = causes.iter().filter(|(slaves, _)| !slaves.is_empty());
     let exceptions: Vec<_> =
-        unable.map(|(slaves, why)| format!(", held for {}: {why}", shortened(slaves))).collect();
-    reasons.push(match (exceptions.is_empty(), third.is_empty()) {
+        causes.map(|(slaves, why)| format!(", held for {}: {why}", shortened(slaves))).collect();
+    reasons.push(match (exceptions.is_empty(), fmi3.is_empty()) {
         (false, _) => format!("extrapolation limited{}", exceptions.join("")),
         (true, true) => {
             "extrapolation limited: all connected FMUs take input derivatives (canInterpolateInputs)"
