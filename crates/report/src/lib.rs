@@ -388,21 +388,21 @@ struct Events {
     /// The number of all such times.
     count: usize,
     /// The time of the row before.
-    before: Option<f64>,
+    previous: Option<f64>,
     /// The last time that occurred in several rows.
-    last: Option<f64>,
+    last_event: Option<f64>,
 }
 
 impl Events {
     fn push(&mut self, time: f64) {
-        if self.before == Some(time) && self.last != Some(time) {
-            self.last = Some(time);
+        if self.previous == Some(time) && self.last_event != Some(time) {
+            self.last_event = Some(time);
             self.count += 1;
             if self.times.len() < MARKS {
                 self.times.push(time);
             }
         }
-        self.before = Some(time);
+        self.previous = Some(time);
     }
 }
 
