@@ -69,13 +69,13 @@ impl Tail {
         let length = self.file.length();
         let content = offset + (group.len() + footer.len()) as u64;
         let end = content.next_multiple_of(LINK as u64);
-        let start = end - footer.len() as u64;
-        let written = self.write(offset, group, start, &footer);
+        let footer_start = end - footer.len() as u64;
+        let written = self.write(offset, group, footer_start, &footer);
         if let Err(error) = written.and_then(|()| self.file.set_length(end)) {
             let _ = self.file.set_length(length);
             return Err(error);
         }
-        (self.start, self.footer_start, self.footer) = (offset, start, footer);
+        (self.start, self.footer_start, self.footer) = (offset, footer_start, footer);
         Ok(())
     }
 
