@@ -130,6 +130,7 @@ impl PreparedRun {
         })
     }
 
+    /// Starts or resumes the run; `record` creates the recorder for the ports, the interval and the start time.
     fn start_recording(
         self,
         saved: Option<&SavedRun>,
@@ -137,8 +138,8 @@ impl PreparedRun {
     ) -> Result<Run, Error> {
         let Self { config, mut system, plan, ports, scenario, tables, opened } = self;
         let trace = config.results.bus_trace.as_deref();
-        let from = plan.experiment.start_time;
-        let trace = trace.map(|path| BusTrace::start(path, &mut system, from)).transpose()?;
+        let start = plan.experiment.start_time;
+        let trace = trace.map(|path| BusTrace::start(path, &mut system, start)).transpose()?;
         let text = config.render()?;
         let Plan { algorithm, experiment, .. } = &plan;
         let mut simulation = match saved {
@@ -148,19 +149,18 @@ impl PreparedRun {
         if let Some(early) = simulation.early_end() {
             tracing::warn!("{early}");
         }
-        let start = experiment.start_time;
         let recorder = record(&mut simulation, &ports, plan.every, start);
         let mut recorder = recorder.inspect_err(|error| crash::note(error.sentence()))?;
-        let due = saved.and_then(|saved| saved.due(plan.every));
+        let next_rows = saved.and_then(|saved| saved.due(plan.every));
         if let (Some(recorder), Some(saved)) = (&mut recorder, saved) {
             recorder.slow.restore(&mut simulation, &saved.slow)?;
-            if let Some(due) = due {
+            if let Some(due) = next_rows {
                 recorder.due = due.clone();
             }
         }
         trace.as_ref().map_or(Ok(()), BusTrace::create)?;
         Ok(Run {
-            resumed: due.is_some(),
+            resumed: next_rows.is_some(),
             checkpoints: Checkpoints::new(&config, text, plan.every),
             simulation,
             recorder,

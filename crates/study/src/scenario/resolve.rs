@@ -119,13 +119,13 @@ impl Target<'_> {
 }
 
 impl<'a> Resolver<'a> {
-    /// Returns the variable called `name`; an error if it does not exist.
+    /// Returns the variable called `name`, at the port of its connected alias if any; an error if it does not exist.
     pub(super) fn target(&self, name: &str) -> Result<Target<'a>, Reason> {
         let system = self.system;
         let stated = system.port(name)?;
         let (name, variable) = (system.name(stated), system.variable(stated));
-        let source = system.source(stated);
-        let port = source.map_or_else(|| system.holder(stated), |connection| connection.to);
+        let connection = system.source(stated);
+        let port = connection.map_or_else(|| system.holder(stated), |connection| connection.to);
         let description = system.slaves[port.slave].1.description();
         Ok(Target { port, name, variable, description })
     }
