@@ -277,8 +277,8 @@ fn estimates(design: &Design) -> Vec<Variable> {
     let (n, q) = (design.states.len(), design.faults.len());
     let is_difference = |k: usize| (n..n + q).contains(&k) || k >= design.transfer_at(0);
     let mut states = states(design);
-    let faults = states.split_off(n);
-    faults
+    let others = states.split_off(n);
+    others
         .into_iter()
         .chain(states)
         .map(|State { position: k, name, texts: [text, _], units: [unit, _] }| {
