@@ -6,7 +6,7 @@ use crate::tracking::tracking_rank;
 use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
 
-/// Singular values below this part of the largest count as zero.
+/// Singular values below this fraction of the largest count as zero.
 const TOLERANCE: f64 = 1e-12;
 
 /// The actuators of a plant, some of which have failed.

@@ -60,7 +60,8 @@ pub struct AsoDesign {
 pub(crate) type Place =
     fn(&DMatrix<f64>, &DMatrix<f64>, &[Complex<f64>]) -> Result<Alternatives, Error>;
 
-/// Computes `K_x` from the first `states` states, on which the other states do not act; its other columns are zero.
+/// Computes `K_x` from the first `states` states, on which the later states do not act; the columns of `K_x` for the
+/// later states are zero.
 pub(crate) fn place_controller(
     plant: &FaultyPlant,
     states: usize,
@@ -85,7 +86,8 @@ pub(crate) struct GainCandidates<'a> {
 }
 
 impl GainCandidates<'_> {
-    /// Returns the gains of the pair whose loop [`least_sensitive`] prefers, and the quality of both assignments.
+    /// Returns the gains of the feedback and observer whose loop [`least_sensitive`] prefers, with the quality of each
+    /// of these two assignments.
     pub(crate) fn best(&self) -> Result<(Gains, [Quality; 2]), Error> {
         let Self { feedbacks, observers, .. } = self;
         let [mut pairs, second] = pairs(&feedbacks.candidates(), &observers.candidates());
@@ -117,7 +119,7 @@ impl GainCandidates<'_> {
         }
     }
 
-    /// The loop of the plant and the controller with these gains.
+    /// The loop of the plant and the controller with the gains of `feedback` and `observer`.
     fn closed(&self, feedback: &Placement, observer: &Placement) -> Result<Loop, Error> {
         let Self { plant, domain, .. } = *self;
         let d = DMatrix::zeros(plant.c.nrows(), plant.b.ncols());
@@ -224,7 +226,8 @@ impl ExtendedPlant {
     }
 }
 
-/// Norm of B `K_f` + `F_a` in the first `states` rows, divided by the norm of these rows of `F_a` unless they are zero.
+/// Norm of the first `states` rows of B `K_f` + `F_a`, divided by the norm of the first `states` rows of `F_a` unless
+/// that norm is zero.
 fn cancellation_residual(plant: &FaultyPlant, states: usize, k_f: &DMatrix<f64>) -> f64 {
     let size = plant.f_a.rows(0, states).norm();
     let residual = (&plant.b * k_f + &plant.f_a).rows(0, states).norm();

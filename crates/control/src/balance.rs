@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, DVector};
 const SWEEPS: usize = 100;
 /// A scaling is applied only if it reduces the sum of the norms by 5 %.
 const WORTHWHILE: f64 = 0.95;
-/// In [`Balance::of_exponential`], a row or column norm above this multiple of the largest diagonal entry is large.
+/// [`Balance::of_exponential`] also scales a state whose row or column is zero if the norm of its column or row exceeds
+/// this multiple of the largest diagonal entry.
 const LARGE: f64 = 1024.0;
 
 /// S^-1 A S, S diagonal and positive such that row i and column i have about the same norm.
@@ -74,7 +75,7 @@ impl Balance {
         balance
     }
 
-    /// Balances A; `entering`, `leaving`: for each state, the 1-norm of its row of B and the 1-norm of its column of C.
+    /// Balances A. `entering`: the 1-norm of each row of B; `leaving`: the 1-norm of each column of C.
     fn with_signals(
         a: &DMatrix<f64>,
         mut entering: DVector<f64>,
@@ -100,8 +101,8 @@ impl Balance {
         balance
     }
 
-    /// Scales a state and returns the factor; None if the scaling would reduce the norms by less than 5 %. `signals`:
-    /// the 1-norms of the state's column of C and of its row of B.
+    /// Scales a state and returns the factor; None if the scaling would reduce the sum of the norms by less than 5 %.
+    /// `signals`: the 1-norms of the state's column of C and of its row of B.
     fn level(
         &mut self,
         transposed: &mut DMatrix<f64>,
@@ -130,7 +131,7 @@ impl Balance {
     }
 }
 
-/// The power of two nearest to x > 0 on the logarithmic scale; x itself if it is zero, subnormal, infinite or NaN.
+/// The power of two nearest to x > 0 on the logarithmic scale; x itself if x is zero, subnormal, infinite or NaN.
 pub(crate) fn power_of_two(x: f64) -> f64 {
     if !x.is_normal() {
         return x;

@@ -12,17 +12,18 @@ use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector};
 
-/// Factor by which the weight changes while the bandwidth is not yet enclosed.
+/// Factor between successive trial weights until two of them enclose the required bandwidth.
 const STRIDE: f64 = 100.0;
 /// Number of strides after which a loop gain of one counts as out of reach.
 const STRIDES: usize = 6;
 /// Largest distance of the loop gain from one.
 const ACCURACY: f64 = 1e-6;
-/// If a stride leaves more than this part of a loop gain above one, unstable modes keep the loop gain above one.
+/// If a change of the weight by [`STRIDE`] leaves more than this fraction of a loop gain above one, unstable modes keep
+/// the loop gain above one.
 const SATURATED: f64 = 0.7;
 /// Largest number of steps of the regula falsi.
 const STEPS: usize = 40;
-/// Entries of h below this part of the largest are raised to it.
+/// Least entry of the energies h of [`NaturalUnits`], relative to the largest, so that no unit is infinite.
 const FLOOR: f64 = 1e-12;
 /// Factor on a bandwidth at which the response is infinite, the frequency of an undamped mode.
 const DETUNING: f64 = 1.01;
@@ -160,7 +161,7 @@ pub fn filter(
     Ok(ByBandwidth { result: kalman(a, c, w, &v, domain)?, loop_gain, weight })
 }
 
-/// Returns the weight r of R = r I and its loop gain.
+/// Returns the r of R = r I for which the loop gain at the bandwidth is one, and the loop gain reached.
 fn weight(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -195,8 +196,8 @@ fn weight(
     enclosed(start, loop_gain)
 }
 
-/// Searches from `start` for an x with f(x) = 1, f decreasing; returns e^x and f(x). If the strides do not pass such an
-/// x, these are the values at the last stride.
+/// Searches from `start` for the x at which the decreasing function f is 1; returns e^x and f(x). If the strides do not
+/// pass this x, returns the values at the last stride.
 fn enclosed(start: f64, f: impl Fn(f64) -> Result<f64, Error>) -> Result<(f64, f64), Error> {
     let (mut x, mut value) = (start, f(start)?);
     let direction = if value > 1.0 { 1.0 } else { -1.0 };

@@ -144,7 +144,7 @@ pub fn complete_controller(
     Ok(CompleteController { commands, estimates })
 }
 
-/// Puts a measurement filter before a controller: its states are `y_f`, then the controller's.
+/// Puts a measurement filter before a controller. States: `y_f` of the filter, then the states of the controller.
 fn filtered(controller: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpace, Error> {
     let Some(filter) = filter else {
         return Ok(controller.clone());

@@ -13,7 +13,7 @@ use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// A delay at most this part of a sample below a whole number of samples counts as this number.
+/// A delay that is below a whole number of samples by at most this fraction of a sample counts as this number.
 const WHOLE: f64 = 1e-9;
 
 /// Returns A and b of the Pade approximant of e^(-s) with numerator degree q - 1 and denominator degree q.
@@ -79,7 +79,8 @@ pub struct ExactLoop {
     pub radius: f64,
     /// The frequency of `radius` in rad/s.
     pub frequency: f64,
-    /// The largest singular value of S over the frequencies, with exact delays: at commands, at measurements.
+    /// The peaks over frequency of the largest singular value of S with exact delays: at the commands, then at the
+    /// measurements.
     pub peaks: [f64; 2],
 }
 
@@ -296,7 +297,8 @@ impl Delays {
     }
 }
 
-/// Discretises a path; returns the path without its lag, and the lag in s, a whole number of samples.
+/// Discretises a path with a delay; returns the sampled path without its lag, a whole number of samples, and the lag in
+/// s.
 fn sampled_path(path: &StateSpace, delay: f64, period: f64) -> Result<(StateSpace, f64), Error> {
     check::positive("the sample time", period)?;
     let samples = (delay / period + WHOLE).floor();

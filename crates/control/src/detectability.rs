@@ -20,8 +20,8 @@ use crate::{Domain, Error};
 pub struct Detectability {
     /// Rank of (A, C).
     pub observability: Rank,
-    /// The unobservable modes of A, each with whether it is stable. If all are stable, (A, C) is
-    /// detectable: an observer exists, but it cannot move these eigenvalues.
+    /// The unobservable modes of A; the flag says whether the mode is stable. If all are stable, (A, C) is detectable:
+    /// an observer exists, but its gain does not move these eigenvalues.
     pub unobservable: Vec<(Mode, bool)>,
     /// The combinations of faults that the measurements cannot tell from motions of the states. If
     /// there are none and (A, C) is observable, the augmented observer exists.

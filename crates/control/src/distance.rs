@@ -16,13 +16,13 @@ use std::cmp::Ordering;
 
 /// Largest number of evaluations of the smallest singular value in the search of the complex plane.
 const EVALUATIONS: usize = 1000;
-/// A distance below this is within rounding; its lower bound is not searched for.
+/// A distance of the scaled pair below this is a rounding error, so that no lower bound is searched.
 const ROUNDING: f64 = 1e-14;
 /// The search ends when the lower bound reaches this fraction of the upper bound.
 const CLOSE: f64 = 0.9;
 /// Largest number of steps of a descent.
 const DESCENT_STEPS: usize = 30;
-/// Number of states up to which the plane is searched for a lower bound.
+/// Number of states up to which the complex plane is searched for a lower bound.
 const LARGEST_SEARCH: usize = 24;
 /// The descent ends when a step lowers the value by less than this fraction.
 const WORTHWHILE: f64 = 1e-3;
@@ -106,7 +106,7 @@ struct Pencil {
     b: DMatrix<f64>,
     /// The norm by which A was divided.
     unit: f64,
-    /// The pair in coordinates for fast evaluations, with more than 24 states.
+    /// The pair in coordinates for fast evaluations; None up to 24 states.
     reduced: Option<ReducedPencil>,
 }
 
@@ -120,7 +120,7 @@ impl Pencil {
         Ok(Self { a, b, unit, reduced })
     }
 
-    /// Smallest singular value of [A - s I, B], and u* A u for its left vector u.
+    /// Smallest singular value of [A - s I, B], and u* A u with its left singular vector u.
     fn at(&self, s: Complex<f64>) -> Result<(f64, Complex<f64>), Error> {
         if let Some(reduced) = &self.reduced {
             return Ok(reduced.at(s));

@@ -125,7 +125,7 @@ pub enum Error {
     Overflow { what: &'static str },
 }
 
-/// A complex number as text, without the imaginary part if it is zero.
+/// Formats a complex number, without an imaginary part of zero.
 fn shown(value: Complex<f64>) -> String {
     if value.im == 0.0 { value.re.to_string() } else { value.to_string() }
 }

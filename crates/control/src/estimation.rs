@@ -39,7 +39,7 @@ const FASTEST: f64 = 4.0;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct OwnModel {
-    /// The gains; of a nonlinear law those of its linearisation about a zero estimate.
+    /// The gains; for a nonlinear law, the gains of its linearisation about a zero estimate.
     pub gains: Gains,
     /// `A_f` of the observer, q x q.
     pub a_f: DMatrix<f64>,
@@ -94,7 +94,7 @@ fn require_constant_faults(plant: &FaultyPlant, domain: Domain) -> Result<(), Er
     check::that(difference <= 0.0, "A_f of f' = A_f f", difference, rule)
 }
 
-/// Checks that the controller is sampled and its estimator a current one.
+/// Checks that the controller is sampled and has a current estimator.
 fn require_current(domain: Domain, estimator: Estimator) -> Result<(), Error> {
     let holds = domain != Domain::Continuous && estimator == Estimator::Current;
     check::that(holds, "the domain", f64::NAN, "a sampled controller with a current estimator")

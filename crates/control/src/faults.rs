@@ -43,14 +43,14 @@ pub enum FaultEntry {
     Actuator(DVector<f64>),
     /// In the measurements, y = C x + column f; p entries.
     Sensor(DVector<f64>),
-    /// In both, x' = A x + B u + `states` f, y = C x + `measurements` f; n and p entries.
+    /// In states and measurements, x' = A x + B u + `states` f, y = C x + `measurements` f; n and p entries.
     Both {
         /// The column of `F_a`.
         states: DVector<f64>,
         /// The column of `F_s`.
         measurements: DVector<f64>,
     },
-    /// The input with this index, from zero, loses the part E of its effect: f = -E u.
+    /// The input with this index, from zero, loses the fraction E of its effect: f = -E u.
     LossOfEffectiveness(usize),
 }
 
@@ -65,9 +65,9 @@ impl FaultEntry {
 /// A fault.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
-    /// Where it enters.
+    /// The signals that the fault acts on.
     pub entry: FaultEntry,
-    /// The model by which it develops.
+    /// The model by which the fault develops.
     pub kind: FaultKind,
 }
 
@@ -77,7 +77,7 @@ pub struct Fault {
 pub struct FaultChannel {
     /// The index of the estimate of the fault.
     pub estimate: usize,
-    /// The index of the estimate of its rate, for a ramp.
+    /// For a ramp, the index of the estimate of the rate of the fault.
     pub rate: Option<usize>,
 }
 
@@ -88,11 +88,12 @@ pub struct ExtendedPlant {
     pub plant: FaultyPlant,
     /// The time domain of the plant.
     pub domain: Domain,
-    /// Diagonal of W, in 1/s also in sampled time, p entries. None if y is not filtered.
+    /// Diagonal of W, the rates of the measurement filter, in 1/s also in sampled time, p entries. None if y is not
+    /// filtered.
     pub filter: Option<Vec<f64>>,
     /// Number of states of the plant itself.
     pub states: usize,
-    /// For each given fault its indices in `f_hat`.
+    /// The indices in `f_hat` of each given fault.
     pub channels: Vec<FaultChannel>,
 }
 
@@ -246,7 +247,7 @@ fn models(faults: &[Fault]) -> (DMatrix<f64>, Vec<FaultChannel>) {
     (a_f, channels)
 }
 
-/// The coefficients of the measurement filter with these rates w: w, in sampled time 1 - e^(-w T).
+/// The coefficients of the measurement filter for its rates w: w in continuous, 1 - e^(-w T) in sampled time.
 pub(crate) fn coefficients(rates: &[f64], domain: Domain) -> Vec<f64> {
     match domain {
         Domain::Continuous => rates.to_vec(),

@@ -6,7 +6,7 @@ use crate::svd::Svd;
 use crate::{Error, check};
 use nalgebra::DMatrix;
 
-/// Singular values of B, its columns scaled to length one, below this part of the largest count as zero.
+/// Singular values of B, its columns scaled to length one, below this fraction of the largest count as zero.
 const TOLERANCE: f64 = 1e-12;
 
 /// The plant with faults, (1) of [`crate::aso`], and the fault model: x' = A x + B u + `F_a` f, f' = `A_f` f, y = C x;

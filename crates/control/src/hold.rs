@@ -209,7 +209,7 @@ macro_rules! fixed_sizes {
     };
 }
 
-/// out += M v, column by column; the order of the sums is the same for every size.
+/// Adds M v to `out`, column by column, so that the order of the sums does not depend on the size.
 fn add_product(m: &DMatrix<f64>, v: &[f64], out: &mut [f64]) {
     fixed_sizes!(m, v, out; 1 2 3 4 5 6 7 8);
 }

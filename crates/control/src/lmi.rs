@@ -74,14 +74,13 @@ use nalgebra::{DMatrix, DVector};
 pub enum Outcome<T, C = &'static str> {
     /// A solution whose inequalities were verified by eigenvalues.
     Optimal(T),
-    /// No solution exists: eigenvalues violate each requirement in `conflict`, or the solver has found that these
-    /// requirements contradict each other. Then each of them is necessary for the contradiction.
+    /// No solution exists. Either eigenvalues violate each requirement in `conflict`, or the solver has found that the
+    /// requirements in `conflict` contradict each other and that each is necessary for the contradiction.
     Infeasible {
-        /// Names of requirements, in the order in which they were stated; for a family the indices of
-        /// its members.
+        /// Names of requirements, in the order in which they were stated; for a family of plants, indices of plants.
         conflict: Vec<C>,
     },
-    /// Neither a solution nor a contradiction was found in double precision, with the reason.
+    /// Neither a solution nor a contradiction was found in double precision. Contains the reason.
     Inconclusive(&'static str),
 }
 

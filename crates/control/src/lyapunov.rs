@@ -16,7 +16,7 @@ const ALLOWED_RESIDUAL: f64 = 1e-9;
 const REFINEMENTS: usize = 2;
 /// From this order on the equations are solved by doubling first.
 const LARGE: usize = 48;
-/// A solution with a residual above this is compared with the solution of the other method.
+/// A solution with a residual above this is compared with the solution of a second method.
 const GOOD_RESIDUAL: f64 = 1e-12;
 
 /// The solution P of A' P + P A = -Q or A' P A - P = -Q.
@@ -131,7 +131,7 @@ pub(crate) fn symmetric(matrix: &'static str, m: &DMatrix<f64>) -> Result<(), Er
 
 type LeftSide = fn(&DMatrix<f64>, &DMatrix<f64>, &DMatrix<f64>) -> DMatrix<f64>;
 
-/// One of the two equations, written as remainder = 0.
+/// A Lyapunov equation of continuous or sampled time, written as remainder = 0.
 pub(crate) struct Equation {
     name: &'static str,
     /// The left side plus Q, from A, P and Q.

@@ -22,7 +22,7 @@
 use crate::check::as_number;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// A pivot of a Cholesky factor below this part of its variance, times the order, is a rounding error.
+/// A pivot of a Cholesky factorisation below this, relative to the order times the diagonal entry, is a rounding error.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// A plant in sampled time, z having N states and faults and y having p measurements.
@@ -100,9 +100,9 @@ pub struct NonlinearFilter {
     points: DMatrix<f64>,
     /// The measurements at `points`, as columns.
     measured: DMatrix<f64>,
-    /// S, the covariance of the innovation; a correction replaces it by its Cholesky factor.
+    /// S, the covariance of the innovation; a correction overwrites S with its Cholesky factor.
     s: DMatrix<f64>,
-    /// The covariance of y and z, p x N; a correction overwrites it.
+    /// The covariance of y and z, p x N; overwritten in a correction.
     cross: DMatrix<f64>,
     /// The transpose of H, then the gain K, N x p.
     gain: DMatrix<f64>,
@@ -273,7 +273,7 @@ impl NonlinearFilter {
     }
 }
 
-/// Sets `mean` to the mean of the columns and subtracts it from each of them.
+/// Sets `mean` to the mean of the columns of `points`, and subtracts it from each column.
 fn centre(points: &mut DMatrix<f64>, mean: &mut DVector<f64>) {
     mean.fill(0.0);
     for point in points.column_iter() {

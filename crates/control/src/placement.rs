@@ -31,10 +31,11 @@ use subspace::AssignableSubspaces;
 /// Inputs count as dependent when a singular value of B, its columns scaled to length one, is below
 /// this fraction of the largest.
 const DEPENDENT_INPUTS: f64 = 1e-13;
-/// The eigenvalue error of an alternative is at most `LESS_EXACT` times that of the chosen gain, or at most `EXACT`.
+/// An alternative is accepted if its eigenvalue error is at most `LESS_EXACT` times the error of the chosen gain, or at
+/// most `EXACT`.
 const LESS_EXACT: f64 = 10.0;
 const EXACT: f64 = 1e-9;
-/// Largest number of alternatives above the order [`LARGEST_DESCENT`].
+/// Largest number of alternatives for a plant of an order above [`LARGEST_DESCENT`].
 const MOST_OF_LARGE: usize = 2;
 
 /// A state feedback u = K x with assigned eigenvalues.
@@ -189,11 +190,11 @@ pub fn place_discrete(
     PlacementProblem { a, b, poles, sampled: true }.place(&Coordinates::Balanced)
 }
 
-/// The coordinates in which the eigenvectors of the candidate of least condition number are chosen.
+/// The coordinates of the states in which the condition number of the eigenvectors is minimised.
 pub(crate) enum Coordinates<'a> {
     /// The coordinates of A.
     Given,
-    /// Those that balance A + B K of the candidate in the coordinates of A.
+    /// Coordinates that balance A + B K, with the K found in the coordinates of A.
     Balanced,
     /// x = S z with the diagonal S.
     Scaled(&'a DVector<f64>),
@@ -202,9 +203,9 @@ pub(crate) enum Coordinates<'a> {
 /// Which placements are computed.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Extent {
-    /// Only the chosen one.
+    /// Only the chosen placement.
     Chosen,
-    /// The chosen one and alternatives to it.
+    /// The chosen placement and alternatives to it.
     Alternatives,
 }
 
@@ -216,7 +217,7 @@ pub(crate) struct PlacementProblem<'a> {
     pub(crate) b: &'a DMatrix<f64>,
     /// n eigenvalues.
     pub(crate) poles: &'a [Complex<f64>],
-    /// Whether A and the eigenvalues are those of a sampled system.
+    /// Whether A and the eigenvalues are of sampled time.
     pub(crate) sampled: bool,
 }
 
@@ -225,8 +226,8 @@ impl PlacementProblem<'_> {
         Ok(self.alternatives(coordinates, Extent::Chosen)?.chosen)
     }
 
-    /// Assigns the eigenvalues by the chosen eigenvectors, by those of the standard methods and, with
-    /// [`Extent::Alternatives`], by others, with the errors of [`place`].
+    /// Assigns the eigenvalues by the chosen eigenvectors, by the eigenvectors of the standard methods and, with
+    /// [`Extent::Alternatives`], by further eigenvectors; errors are the same as of [`place`].
     pub(crate) fn alternatives(
         &self,
         coordinates: &Coordinates<'_>,
@@ -308,7 +309,7 @@ struct Assignable {
     b: DMatrix<f64>,
     /// X, m x r.
     basis: DMatrix<f64>,
-    /// The subspaces of the eigenvectors for these A and B.
+    /// The subspaces of the eigenvectors for the scaled A and B.
     problem: AssignableSubspaces,
     /// Diagonal of S.
     units: DVector<f64>,
@@ -345,7 +346,8 @@ struct Assignment {
 }
 
 impl Assignment {
-    /// Eigenvectors of least condition number in these units of the states, and the starts of their search.
+    /// Eigenvectors of least condition number with the states in the given units, and the starts of the search for
+    /// them.
     fn in_units(
         problem: &PlacementProblem<'_>,
         units: &DVector<f64>,

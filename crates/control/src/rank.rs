@@ -14,7 +14,7 @@ use crate::svd::ComplexSvd;
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// A state is dominant in a mode when its entry in the vector is above this part of the largest.
+/// A state is dominant in a mode if its entry in the eigenvector is above this fraction of the largest entry.
 const DOMINANT: f64 = 0.5;
 
 /// The result of a rank decision.
@@ -25,7 +25,7 @@ pub struct Rank {
     pub rank: usize,
     /// Number of states n; the pair is controllable or observable when `rank` equals n.
     pub n: usize,
-    /// Singular values at or below this count as zero, relative to the scaled matrix.
+    /// Singular values relative to the scaled matrix that are at most this count as zero.
     pub tolerance: f64,
     /// The smallest relative singular value that counted as nonzero. The nearer it is to
     /// `tolerance`, the less certain the rank. Zero when the rank is zero.
@@ -36,7 +36,7 @@ pub struct Rank {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Mode {
-    /// Its eigenvalue.
+    /// The eigenvalue of the mode.
     pub eigenvalue: Complex<f64>,
     /// An eigenvector of length one in the given coordinates, its largest entry real and positive. For an unobservable
     /// mode v with A v = s v, C v = 0: the measurements do not show a motion along v. For an uncontrollable mode w with

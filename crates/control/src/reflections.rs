@@ -4,7 +4,7 @@ use nalgebra::{ComplexField, DMatrix, DVector};
 
 /// The Q of M = Q R, as the product of the reflections H = I - tau v v*.
 ///
-/// Signs and all columns of Q, also those orthogonal to M, are those of LAPACK.
+/// Q has the signs and the columns, also the columns orthogonal to M, that LAPACK computes.
 pub(crate) struct Reflections<T> {
     rows: usize,
     /// tau and v of each reflection; v of reflection k lacks its first k entries, which are zero, and

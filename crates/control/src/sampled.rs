@@ -38,7 +38,7 @@ pub struct SampledDesign {
     pub controller: Quality,
     /// Quality of the pole assignment for the error dynamics, in the coordinates of [`place_estimator`].
     pub observer: Quality,
-    /// Largest modulus of the eigenvalues of the closed loop; below one it is stable.
+    /// Largest modulus of the eigenvalues of the closed loop, which is stable if this is below one.
     pub radius: f64,
 }
 

@@ -127,7 +127,8 @@ impl ComplexSvd {
         self.real.values.iter().step_by(self.repeats).copied().collect()
     }
 
-    /// Number of singular values above `tolerance` times the largest; one of the copies of a value above it suffices.
+    /// Number of singular values above `tolerance` times the largest. The real form of a complex M repeats each value;
+    /// one copy above the limit suffices.
     pub(crate) fn rank(&self, tolerance: f64) -> usize {
         self.real.rank(tolerance).div_ceil(self.repeats)
     }

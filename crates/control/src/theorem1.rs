@@ -27,7 +27,7 @@ use nalgebra::DMatrix;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Certificate {
-    /// The design parameter alpha. It cancels in `delta`.
+    /// The design parameter alpha. The bound `delta` does not depend on alpha.
     pub alpha: f64,
     /// Bound of the fault, in its unit.
     pub beta: f64,

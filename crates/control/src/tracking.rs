@@ -38,7 +38,7 @@ use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector};
 
-/// Singular values below this, relative to the largest, count as zero; rows and columns have length one.
+/// Singular values below this fraction of the largest count as zero, with rows and columns scaled to length one.
 const TOLERANCE: f64 = 1e-12;
 /// Sweeps that scale rows and columns to length one.
 const SWEEPS: usize = 4;
@@ -63,7 +63,7 @@ pub struct IntegralAction {
 pub struct TrackingRank {
     /// Rank of [A, B; H C, 0].
     pub rank: usize,
-    /// Number of rows of this matrix, n + t: if `rank` equals it, a constant H y of any value is possible.
+    /// The full rank n + t: if `rank` reaches it, a constant H y of any value is possible.
     pub expected: usize,
     /// Rank of H C.
     pub outputs: usize,

@@ -46,7 +46,7 @@ pub enum Transfer {
 pub struct Term {
     /// X.
     pub transfer: Transfer,
-    /// W; in sampled time its frequencies are those after [`crate::weight::bilinear_frequency`].
+    /// W; in sampled time, at the frequencies that [`crate::weight::bilinear_frequency`] returns.
     pub weight: Weight,
 }
 
@@ -54,7 +54,7 @@ pub struct Term {
 pub struct Tuning<'a> {
     /// G, with D = 0, in the domain of the controller and in units in which its channels are comparable.
     pub plant: StateSpace,
-    /// K(theta), in the same units, from the measurements, followed by the references. Derivatives are central
+    /// K(theta), in the units of `plant`, from the measurements and then the references. Derivatives are central
     /// differences of its matrices, which are exact for entries of second degree in theta.
     pub controller: &'a (dyn Fn(&DVector<f64>) -> Result<StateSpace, Error> + Sync),
     /// H, t x p: H y follows the references; no rows without references.
@@ -63,7 +63,7 @@ pub struct Tuning<'a> {
     pub terms: Vec<Term>,
     /// The largest allowed instability of the loop, negative, see [`crate::stability::instability`].
     pub instability: f64,
-    /// Whether the search may use these parameters.
+    /// Whether the search may use the given theta.
     pub is_allowed: &'a (dyn Fn(&DVector<f64>) -> bool + Sync),
     /// The bandwidth in rad/s; the search examines frequencies from a thousandth of it to a thousand times it.
     pub rate: f64,

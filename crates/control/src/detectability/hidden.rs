@@ -26,11 +26,12 @@ use crate::faulty_plant::FaultyPlant;
 use crate::svd::ComplexSvd;
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Singular values below this part of the largest count as zero; of `A_f` - s I, below this part of |`A_f`| + |s|.
+/// Singular values below this fraction of the largest count as zero; for `A_f` - s I, below this fraction of |`A_f`| +
+/// |s|.
 const RANK_TOLERANCE: f64 = 1e-12;
-/// Eigenvalues of the fault model closer than this, relative to its norm, count as equal.
+/// Eigenvalues of the fault model closer than this, relative to the norm of the fault model, count as equal.
 const CLUSTER_TOLERANCE: f64 = 1e-6;
-/// An entry of a combination below this, relative to the largest, counts as zero.
+/// Entries of a combination of faults below this fraction of its largest entry count as zero.
 const ENTRY_TOLERANCE: f64 = 1e-6;
 
 type ComplexVector = DVector<Complex<f64>>;
@@ -95,7 +96,7 @@ pub(crate) fn hidden_faults(plant: &FaultyPlant) -> Result<Vec<HiddenFault>, Err
     Ok(hidden)
 }
 
-/// The distinct eigenvalues of `A_f` on and above the real axis; clusters count as their mean.
+/// The distinct eigenvalues of `A_f` on and above the real axis; a cluster counts as one eigenvalue, its mean.
 fn distinct_eigenvalues(a_f: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     let radius = CLUSTER_TOLERANCE * a_f.norm();
     let mut clusters: Vec<(Complex<f64>, f64)> = Vec::new();
@@ -163,7 +164,7 @@ fn without_rounding_errors(vector: &ComplexVector, lengths: &[f64]) -> ComplexVe
     ComplexVector::from_fn(vector.len(), entry)
 }
 
-/// The rank of M and a basis of its null space; if M has imaginary parts, a single vector of it.
+/// The rank of M and a basis of the null space of M; for a complex M only one vector of the null space.
 fn null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error> {
     let svd = ComplexSvd::new(m)?;
     let (cols, rank) = (m.ncols(), svd.rank(RANK_TOLERANCE));

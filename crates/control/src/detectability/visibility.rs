@@ -6,8 +6,8 @@ use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-/// An output row restricted to the reached states counts as zero below this part of the norm of the row; a singular
-/// value counts as zero below this part of the largest.
+/// An output row restricted to the reached states counts as zero below this fraction of the norm of the row; a singular
+/// value counts as zero below this fraction of the largest.
 const TOLERANCE: f64 = 1e-12;
 
 /// The effect of one fault on one measurement.

@@ -1,11 +1,13 @@
 //! The chi-square distribution, central and noncentral, for a whole number of degrees of freedom.
 
-/// The series ends at a weight below this part of the sum; the weights are factors of probabilities, at most 1.
+/// The series of the noncentral distribution ends at a weight below this fraction of the sum; a weight multiplies a
+/// probability, which is at most 1.
 const NEGLIGIBLE: f64 = 1e-17;
 const MOST_TERMS: u32 = 1_000_000;
 /// The largest noncentrality whose series is summed.
 const LARGEST: f64 = 1e6;
-/// Standard deviations below the mean: in double precision, a variable is above this point with probability 1.
+/// In double precision, a noncentral chi-square variable is above a point this many standard deviations below its mean
+/// with probability 1.
 const FAR: f64 = 40.0;
 
 /// The probability that a chi-square variable with `degrees` degrees of freedom is above `x`.
@@ -112,7 +114,7 @@ pub(super) fn normal_density(x: f64) -> f64 {
     (-0.5 * x * x).exp() * 0.5 * std::f64::consts::FRAC_2_SQRT_PI * std::f64::consts::FRAC_1_SQRT_2
 }
 
-/// The probability that a chi-square variable is above x, for degrees of freedom that grow by two.
+/// The probability that a chi-square variable is above x, updated as its degrees of freedom grow by two.
 struct Terms {
     /// x / 2, above 0.
     half: f64,

@@ -8,20 +8,21 @@ use nalgebra::{DMatrix, DVector};
 
 /// Points of the quadrature for the density of a cumulative sum between 0 and the threshold.
 const NODES: usize = 48;
-/// More steps than the density of a sum without a fault needs to settle: its deviation decays by about a factor of
-/// exp(-(pi / h)^2) in each for the least drifts, and h is at most [`LARGE`].
+/// Number of steps in which the density of a cumulative sum without a fault settles. For the smallest drifts, the
+/// distance from the settled density decays by a factor of about exp(-(pi / h)^2) per step; the threshold h is at most
+/// [`LARGE`].
 const SETTLING: usize = 10_000;
 const BISECTIONS: usize = 60;
 /// The largest threshold for which the integral equation of single samples is solved.
 const LARGE: f64 = 40.0;
-/// The approximate threshold of a test of grouped samples, in place of a threshold above [`LARGE`].
+/// A test with a threshold above [`LARGE`] is computed as a test of grouped samples with about this threshold.
 const REDUCED: f64 = 20.0;
 /// The largest threshold that is tried.
 const LARGEST: f64 = 1e6;
 /// Twice the mean overshoot of a random walk with standard normal steps over a distant threshold: Siegmund (1985),
 /// (10.37).
 const EXCESS: f64 = 1.166;
-/// The largest run length computed from LU factors, with a relative error of about 1e-16 times the run length.
+/// The largest run length that is computed from LU factors: their relative error is about 1e-16 times the run length.
 const LONGEST: f64 = 1e12;
 
 /// The two-sided test by cumulative sums of a residual g with variance 1 and, without faults, mean 0.
@@ -168,8 +169,8 @@ impl Cusum {
         Delay { missed }
     }
 
-    /// The number N of samples in a group, and the test for their sum divided by N^(1/2). Up to a threshold of 40, N is
-    /// 1 and the test unchanged.
+    /// The number N of samples in a group, and the test for the sum of a group divided by N^(1/2). Up to a threshold of
+    /// 40, N is 1 and the test is `self`.
     fn grouped(&self) -> (usize, Self) {
         if self.threshold <= LARGE {
             return (1, *self);
@@ -198,8 +199,8 @@ fn start(nodes: &[f64], row: usize) -> f64 {
     if row == 0 { 0.0 } else { nodes[row - 1] }
 }
 
-/// The probabilities of a step from the states in the rows, 0 and the nodes, to those in the columns; `shift`: the
-/// drift less the mean of the residual.
+/// The probabilities that one step takes a cumulative sum from the state of the row to the state of the column. States:
+/// 0, then the nodes. `shift`: the drift minus the mean of the residual.
 fn transitions(nodes: &[f64], weights: &[f64], shift: f64) -> DMatrix<f64> {
     let count = nodes.len() + 1;
     DMatrix::from_fn(count, count, |row, column| match column {
@@ -228,7 +229,8 @@ fn mean_steps(mut transitions: DMatrix<f64>, mut alarms: DVector<f64>) -> f64 {
     steps[0] / alarms[0]
 }
 
-/// The distribution of one sum that has not been above its threshold: the probability of 0, the density at nodes.
+/// The distribution of a cumulative sum that has not been above its threshold: the probability of 0, and the density at
+/// the nodes.
 struct Sums {
     drift: f64,
     nodes: Vec<f64>,
@@ -258,7 +260,7 @@ impl Sums {
         Self { drift: test.drift, nodes, weights, zero: parts[0], density }
     }
 
-    /// Advances by one sample of a residual with this mean, and drops the probability above the threshold.
+    /// Advances by one sample of a residual with mean `mean`, and drops the probability above the threshold.
     fn step(&mut self, mean: f64) {
         let shift = self.drift - mean;
         let masses: Vec<f64> =

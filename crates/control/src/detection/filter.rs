@@ -8,9 +8,9 @@ use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector};
 
-/// Singular values below this part of the largest count as zero; the columns have length one.
+/// In a matrix with columns of length one, singular values below this fraction of the largest count as zero.
 const TOLERANCE: f64 = 1e-9;
-/// An effect of an input on a measurement below this part of the sum of the moduli of its terms counts as zero.
+/// An effect of an input on a measurement below this fraction of the sum of the moduli of its terms counts as zero.
 const ROUNDING: f64 = 1e-13;
 
 /// A plant with noise and unknown inputs d: x' = A x + B u + w + sum of e d, y = C x + v + sum of `e_s` d;
@@ -23,9 +23,9 @@ pub struct NoisyPlant {
     pub b: DMatrix<f64>,
     /// C, p x n.
     pub c: DMatrix<f64>,
-    /// W, n x n: intensity of the process noise w; its covariance in sampled time.
+    /// W, n x n: intensity (in sampled time the covariance) of the process noise w.
     pub w: DMatrix<f64>,
-    /// V, p x p, positive definite: intensity of the measurement noise v; its covariance in sampled time.
+    /// V, p x p, positive definite: intensity (in sampled time the covariance) of the measurement noise v.
     pub v: DMatrix<f64>,
     /// Continuous or sampled time.
     pub domain: Domain,
@@ -47,8 +47,8 @@ pub struct UnknownInput {
 pub struct DetectionFilter {
     /// The filter, from commands u and measurements y to r.
     pub generator: ResidualGenerator,
-    /// k x n, k the order of the filter: this matrix times the initial state of the plant is the initial
-    /// state of the filter. It is T of the unknown-input observer in the coordinates of the filter.
+    /// Maps the initial state of the plant to the initial state of the filter, k x n for a filter of order k: T of the
+    /// unknown-input observer in the coordinates of the filter.
     pub start: DMatrix<f64>,
 }
 

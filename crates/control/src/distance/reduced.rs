@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 /// Number of steps of the inverse iteration.
 const ITERATIONS: usize = 6;
-/// A substitution divides its vector by any entry above this, so that no product overflows.
+/// A substitution divides the vector by the modulus of any entry above this, so that no product overflows.
 const LARGE: f64 = 1e100;
 
 /// The pencil [B, A - s I] in coordinates in which [B, A] is zero below its diagonal.
@@ -46,7 +46,8 @@ impl ReducedPencil {
         Self { both: to_complex(&both), inputs }
     }
 
-    /// Returns an upper bound of the smallest singular value, close to it, and u* A u for its left vector u.
+    /// Returns a close upper bound of the smallest singular value of [A - s I, B], and u* A u with its left singular
+    /// vector u.
     pub(super) fn at(&self, s: Complex<f64>) -> (f64, Complex<f64>) {
         let n = self.both.nrows();
         let mut pencil = self.both.clone();
@@ -96,7 +97,7 @@ fn solve_adjoint(t: &ComplexMatrix, u: &mut DVector<Complex<f64>>) {
     u.unscale_mut(u.norm());
 }
 
-/// Divides the vector by the modulus of the entry `at` if this is above [`LARGE`].
+/// Divides the vector by the modulus of its entry `at` if this modulus is above [`LARGE`].
 fn limit(u: &mut DVector<Complex<f64>>, at: usize) {
     let size = u[at].norm();
     if size > LARGE {

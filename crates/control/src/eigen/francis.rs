@@ -82,7 +82,7 @@ fn start_of_block(h: &DMatrix<f64>, last: usize, smallest: f64) -> usize {
     0
 }
 
-/// Two shifts with the same real part: real +- i imaginary.
+/// The shifts real + i imaginary and real - i imaginary of a double QR step.
 struct Shift {
     real: f64,
     /// The modulus of the imaginary part.
@@ -90,8 +90,8 @@ struct Shift {
 }
 
 impl Shift {
-    /// Returns the eigenvalues of the last 2 x 2 block; of two real ones the one nearer to the last entry, twice. Every
-    /// [`EXCEPTIONAL`] sweeps the shifts are those of LAPACK, which break cycles.
+    /// Returns the eigenvalues of the last 2 x 2 block as shifts; if they are real, twice the one nearer to the last
+    /// entry. Every [`EXCEPTIONAL`] sweeps, returns the shifts of LAPACK that break cycles.
     fn new(h: &DMatrix<f64>, first: usize, last: usize, sweeps: usize) -> Self {
         if sweeps.is_multiple_of(EXCEPTIONAL) {
             let at_start = (sweeps / EXCEPTIONAL) % 2 == 1;
@@ -108,8 +108,8 @@ impl Shift {
         Self { real: nearer.re, imaginary: nearer.im.abs() }
     }
 
-    /// The direction of the first column of (H - s1 I) (H - s2 I), with the two shifts, from row `at` on. Differences
-    /// are formed first: in a cluster of eigenvalues the products would cancel.
+    /// The direction of the first column of (H - s1 I) (H - s2 I) for the shifts s1 and s2 and the rows of H from `at`
+    /// on. Differences are formed first: in a cluster of eigenvalues the products would cancel.
     fn column(&self, h: &DMatrix<f64>, at: usize) -> [f64; 3] {
         let (here, next) = (h[(at, at)] - self.real, h[(at + 1, at + 1)] - self.real);
         let (below, right) = (h[(at + 1, at)], h[(at, at + 1)]);
@@ -167,7 +167,7 @@ fn sweep(h: &mut DMatrix<f64>, first: usize, last: usize, shift: &Shift) {
     }
 }
 
-/// The reflection I - w (1, v)' that maps a vector to its first axis: w = tau (1, v).
+/// The reflection I - w (1, v)' with w = tau (1, v), which maps a vector to a multiple of the first axis.
 struct Reflection {
     v: [f64; 2],
     weights: [f64; 3],

@@ -14,9 +14,9 @@ use nalgebra::{Complex, DMatrix, DVector};
 /// Source: C. C. Paige, Properties of numerical algorithms related to computing controllability, IEEE
 /// Trans. Autom. Control 26 (1981): the controller-Hessenberg form.
 pub(crate) struct RankOne {
-    /// A in these coordinates.
+    /// A in Hessenberg form.
     hessenberg: DMatrix<f64>,
-    /// The first row of b c in these coordinates, 1 x n; the other rows are zero.
+    /// The first row of b c in the coordinates of the Hessenberg form, 1 x n; the other rows are zero.
     row: DMatrix<f64>,
 }
 

@@ -13,7 +13,7 @@ use crate::svd::Svd;
 use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
-/// Singular values of C `F_a` below this part of the largest possible one count as zero.
+/// Singular values of C `F_a` below this fraction of the largest possible value count as zero.
 const TOLERANCE: f64 = 1e-8;
 
 /// A plant in coordinates [`y_1`; w] of its states and [`y_1`; `y_2`] of its outputs.
@@ -42,7 +42,7 @@ pub struct DirectForm {
     to: DMatrix<f64>,
     /// The inverse of `to`: [`F_a`, (I - `F_a` `M_1` C) N'].
     from: DMatrix<f64>,
-    /// A in these coordinates.
+    /// A in the coordinates [`y_1`; w].
     a: DMatrix<f64>,
     c_2: DMatrix<f64>,
     pub(super) domain: Domain,

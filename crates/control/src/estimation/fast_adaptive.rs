@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct FastAdaptive {
     /// sigma in 1/s.
     pub sigma: f64,
-    /// The diagonal of Gamma in 1/s, one number for each fault: the rate at which its estimate follows the fault.
+    /// The diagonal of Gamma in 1/s: for each fault, the rate at which the estimate follows the fault.
     pub gamma: Vec<f64>,
 }
 

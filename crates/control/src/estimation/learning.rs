@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 /// The parameter of [`learning`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learning {
-    /// `K_1`: the factor of the previous estimate, above 0 and at most 1.
+    /// `K_1`: the factor by which the previous estimate enters the new one, above 0 and at most 1.
     pub kept: f64,
 }
 

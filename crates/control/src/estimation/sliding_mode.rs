@@ -6,13 +6,14 @@ use crate::gains::Gains;
 use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
 
-/// The part of a constant fault, small compared with rho, by which the boundary layer makes the estimate too small.
+/// The fraction of a constant fault, small compared with rho, that is missing in the estimate because of the boundary
+/// layer.
 const SHORTFALL: f64 = 0.01;
 
 /// The parameters of [`sliding_mode`], one number for each fault, in the unit of the fault.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlidingMode {
-    /// rho, above the largest fault.
+    /// rho: for each fault a bound that the fault does not reach.
     pub rho: Vec<f64>,
     /// delta, the half-width of the boundary layer; None for the width at which small errors decay with the
     /// argument `rate` of [`sliding_mode`].

@@ -5,7 +5,8 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 use crate::svd::Svd;
 use crate::{Error, check};
 
-/// Measurements and rates are independent if their rows, of unit length, have an inverse condition number above this.
+/// Measurements and rates count as independent if their rows, scaled to unit length, have an inverse condition number
+/// above this.
 const SMALLEST: f64 = 1e-3;
 
 /// States of a continuous plant that are its measurements and their rates.
@@ -57,7 +58,7 @@ impl MeasuredStates {
     }
 }
 
-/// The smallest singular value over the largest one of the rows at unit length; 0 if a row is zero.
+/// The smallest over the largest singular value of the rows, scaled to unit length; 0 if a row is zero.
 fn inverse_condition(rows: &[RowDVector<f64>]) -> Result<f64, Error> {
     let columns: Vec<_> = rows.iter().map(RowDVector::transpose).collect();
     if columns.iter().any(|column| column.norm() <= 0.0) {

@@ -7,9 +7,9 @@ use crate::identification::{IdentifiedModel, Windows};
 use crate::svd::Svd;
 use crate::{Error, check};
 
-/// Singular values below this part of the largest one count as rounding errors.
+/// Singular values below this fraction of the largest one count as rounding errors.
 const ROUNDING: f64 = 1e-12;
-/// Innovations below this part of the deviation of the outputs count as rounding errors.
+/// Innovations below this fraction of the deviation of the outputs count as rounding errors.
 const NO_INNOVATION: f64 = 1e-9;
 
 /// The state sequence that the samples determine, for models of every order.
@@ -36,7 +36,7 @@ const NO_INNOVATION: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub struct Subspace {
     windows: Windows,
-    /// The factor of the deviations of the windows from `means`, with signals in `units`.
+    /// A factor of the windows, in `units` and as deviations from `means`.
     factor: DMatrix<f64>,
     means: DVector<f64>,
     units: Vec<f64>,

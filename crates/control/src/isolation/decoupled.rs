@@ -18,12 +18,12 @@ pub(super) struct DecoupledPart {
     pub(super) d_u: DMatrix<f64>,
     pub(super) d_f: DMatrix<f64>,
     pub(super) h: DMatrix<f64>,
-    /// For each fault the length of its column of [`B_f`; `D_f`], relative to its column of the plant.
+    /// For each fault, the length of its column of [`B_f`; `D_f`] relative to the length of its column of the plant.
     pub(super) effects: Vec<f64>,
     /// The singular values closest to the tolerance.
     pub(super) gap: Gap,
-    /// The number of states that y determines, the number of further ones that y' determines, and so on:
-    /// the conjugate partition of the observability indices.
+    /// The number of states that y determines, the number of further states that y' determines, and so on: the
+    /// conjugate partition of the observability indices.
     pub(super) blocks: Vec<usize>,
 }
 
@@ -116,13 +116,13 @@ fn scaled(plant: &DisturbedPlant, decoupled: &[bool]) -> ([DMatrix<f64>; 4], DVe
     ([&plant.a / size, e, multiply_rows(&plant.c, &outputs), d], outputs, size)
 }
 
-/// The norm of A or C, by which values are divided; 1 for zero, as A of integrators is, and without entries.
+/// The norm of A or C as a divisor; 1 if the matrix has no entries or is zero, like A of integrators.
 pub(super) fn size_or_one(m: &DMatrix<f64>) -> f64 {
     let norm = m.norm();
     if norm > 0.0 { norm } else { 1.0 }
 }
 
-/// W: an orthonormal basis of the smallest subspace with [A W, E] ker [C W, D] in it.
+/// An orthonormal basis W of the smallest subspace that contains [A W, E] ker [C W, D].
 fn conditioned_invariant(
     [a, e, c, d]: [&DMatrix<f64>; 4],
     tolerance: f64,
@@ -202,7 +202,7 @@ fn injection(
     Ok(svd.least_squares(&target.transpose(), rank).transpose())
 }
 
-/// For each column the length of `part` over that of `whole`, 0 if both are zero.
+/// For each column, its length in `part` divided by its length in `whole`; 0 if both are zero.
 fn relative_lengths(part: &DMatrix<f64>, whole: &DMatrix<f64>) -> Vec<f64> {
     let columns = part.column_iter().zip(whole.column_iter());
     columns.map(|(part, whole)| part.norm() / whole.norm().max(f64::MIN_POSITIVE)).collect()

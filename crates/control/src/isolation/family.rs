@@ -6,7 +6,7 @@ use crate::svd::Svd;
 use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
-/// Frequencies at which the effect of noise is averaged, and the decades that they span (continuous time).
+/// Number of frequencies at which the effect of noise is averaged; in continuous time they span [`NOISE_DECADES`].
 const NOISE_POINTS: u32 = 40;
 const NOISE_DECADES: f64 = 4.0;
 
@@ -76,7 +76,7 @@ impl Family {
         Ok(svd.right.columns(rank, m.nrows() - rank).transpose())
     }
 
-    /// Replaces the t and L of the members by their combinations with the rows of `factors`.
+    /// Replaces the t and L of the members by their linear combinations with the rows of `factors` as weights.
     fn combine(&mut self, factors: &DMatrix<f64>) {
         for m in self.t.iter_mut().chain(&mut self.l) {
             *m = factors * &*m;
@@ -90,13 +90,13 @@ impl Family {
         self
     }
 
-    /// For each member the response of its residual to the faults.
+    /// The frequency response of the residuals to the faults, with a row for each member.
     pub(super) fn fault_gains(&self, part: &DecoupledPart, frequency: f64) -> ComplexMatrix {
         let input = |at: usize| &self.l[at] * &part.d_f - &self.t[at] * &part.b_f;
         self.response(frequency, input, &(&self.w * &part.d_f))
     }
 
-    /// For each fault an upper bound of the size that its gains would have without cancellation.
+    /// For each fault, an upper bound of its gains: the sum of the norms of the terms, which may cancel in a gain.
     pub(super) fn fault_scale(&self, part: &DecoupledPart, frequency: f64) -> Vec<f64> {
         let s = self.domain.point(frequency);
         let size = |fault: usize| {

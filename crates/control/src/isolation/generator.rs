@@ -14,11 +14,12 @@ const ACCURACIES: f64 = 10.0;
 /// A decoupling error up to this comes from rounding of the data; a larger error comes from a coupling that counted as
 /// zero, so that smaller tolerances are tried.
 const DECOUPLED: f64 = 1e-6;
-/// While the decoupling error is above `DECOUPLED`, a tolerance above this is divided by 100: all are above 1e-14.
+/// While the decoupling error is above `DECOUPLED`, a tolerance above this is divided by 100, so that every tolerance
+/// stays above 1e-14.
 const SMALLEST_TOLERANCE: f64 = 1e-12;
 /// The largest decoupling error that is accepted.
 const ALLOWED: f64 = 1e-3;
-/// Part of the mean variance that is added to W, so that it is positive definite.
+/// Fraction of the mean variance that is added to W, so that W is positive definite.
 const REGULARISATION: f64 = 1e-12;
 
 /// Requirements of a residual.
@@ -27,15 +28,15 @@ pub struct Requirements {
     /// Poles of the generator, real and stable: s < 0, or 1e-3 < z < 1 in sampled time. A generator of
     /// order k has the first k of them; the last one is repeated as often as necessary.
     pub poles: Vec<f64>,
-    /// The frequency, in rad per unit of time, from 0, at which the residual must respond to each fault
-    /// of its pattern: 0 for constant faults.
+    /// The frequency, at least 0, in rad per unit of time, at which the residual must respond to each fault of its
+    /// pattern; 0 for constant faults.
     pub frequency: f64,
     /// The smallest accepted gain of a fault, relative to its largest gain for the same effect of noise, in (0, 1).
     pub quality: f64,
     /// Relative singular values below this count as zero. If the residual then is not decoupled up to
     /// 1e-6 (see [`Residual::decoupling_error`]), smaller values are tried.
     pub tolerance: f64,
-    /// Standard deviation of the noise of each measurement, above zero; None: 1 each.
+    /// Standard deviation of the noise of each measurement, above zero; None means 1 for each.
     pub noise: Option<Vec<f64>>,
 }
 
@@ -53,7 +54,7 @@ impl Requirements {
         (0..k).map(|at| self.poles.get(at).copied().unwrap_or(last)).collect()
     }
 
-    /// The decay rate of the fastest pole, which is its corner frequency in rad per unit of time.
+    /// The corner frequency of the fastest pole in rad per unit of time, which is its decay rate.
     pub(super) fn fastest(&self, domain: Domain) -> f64 {
         let rate = |pole: &f64| match domain {
             Domain::Continuous => -pole,
@@ -104,8 +105,8 @@ pub struct Residual {
     /// The smallest relative gain of the faults of the pattern. The gain of a fault is relative to the largest gain
     /// that this fault can have for the same effect of noise.
     pub quality: f64,
-    /// Number of modes of the plant that no command, disturbance or fault moves. They count as zero; with other initial
-    /// values they may appear in the residual.
+    /// Number of modes of the plant that no command, disturbance or fault moves. Each is taken as zero; from other
+    /// initial values it may appear in the residual.
     pub unreachable: usize,
     /// The smallest relative singular value that counted as nonzero, and the largest that counted
     /// as zero: the wider apart, the more certain the decoupling.

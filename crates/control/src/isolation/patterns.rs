@@ -18,8 +18,8 @@ const PATTERNS: usize = 4096;
 pub struct AchievablePattern {
     /// One entry per fault: whether the residual responds to it at some frequency.
     pub pattern: Vec<bool>,
-    /// Whether a residual of this pattern responds to all its faults at the required frequency, too: for frequency 0,
-    /// whether constant faults stay visible.
+    /// Whether a residual of this pattern responds to all faults of the pattern at the required frequency, too: at
+    /// frequency 0, whether constant faults stay visible.
     pub strong: bool,
 }
 

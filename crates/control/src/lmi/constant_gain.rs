@@ -10,7 +10,8 @@ use std::f64::consts::PI;
 const ROUNDS: usize = 60;
 /// Relative distance between the computed lower and upper bound of a norm.
 const NORM_WIDTH: f64 = 1e-6;
-/// A worst error of this part of the target is at the accuracy of the solver: no lower bound is near to it.
+/// A worst error up to this fraction of the target ends the search: it is at the accuracy of the solver, which cannot
+/// prove a lower bound near it.
 const ATTAINED: f64 = 1e-6;
 
 /// A constant gain with the least worst error over a family of systems.

@@ -83,16 +83,16 @@ impl Coordinates {
         Ok(Self::from_scaled(&scale, &root, &inverse, time_unit(domain, speed)))
     }
 
-    /// Coordinates in which the matrix P~ = `p` of these coordinates becomes the identity; None if
-    /// `p` is not positive definite.
+    /// Coordinates in which P becomes the identity; `p` is P in the coordinates `self`. None if `p` is not positive
+    /// definite.
     pub(super) fn refined(&self, p: &DMatrix<f64>) -> Option<Self> {
         let root = p.clone().cholesky()?.l().transpose();
         let from = &self.from * inverse_of_upper(&root);
         Some(Self { to: root * &self.to, from, unit: self.unit })
     }
 
-    /// Coordinates in which the most interior P~ = `p` of a program in these coordinates is the identity; None if the
-    /// program has no such P~.
+    /// Coordinates in which the most interior P of a program becomes the identity; `p` is the unknown P in the
+    /// coordinates `self`. None if the program has no solution.
     pub(super) fn refined_by(&self, problem: &Problem, p: &Affine) -> Option<Self> {
         self.refined(&p.evaluate(&problem.most_interior()?))
     }
@@ -102,7 +102,7 @@ impl Coordinates {
         self.to.nrows()
     }
 
-    /// These coordinates with further states of the given sizes at the end.
+    /// The coordinates `self`, extended by states of the given sizes at the end.
     pub(super) fn extended(&self, sizes: &DVector<f64>) -> Self {
         let (order, whole) = (self.order(), self.order() + sizes.len());
         let mut to = self.to.clone().resize(whole, whole, 0.0);
@@ -114,7 +114,7 @@ impl Coordinates {
         Self { to, from, unit: self.unit }
     }
 
-    /// The coordinates for A' that correspond to these for A.
+    /// The coordinates for A' that correspond to the coordinates `self` for A.
     pub(super) fn transposed(&self) -> Self {
         Self { to: self.from.transpose(), from: self.to.transpose(), unit: self.unit }
     }
@@ -175,7 +175,7 @@ pub(super) fn row_units(m: &DMatrix<f64>) -> DVector<f64> {
     DVector::from_fn(m.nrows(), |row, _| unit_near(m.row(row).norm()))
 }
 
-/// The mean of the eigenvalues, and the largest distance of one of them from it.
+/// The mean of the eigenvalues, and the largest distance of an eigenvalue from the mean.
 fn spread(a: &DMatrix<f64>) -> Result<(f64, f64), Error> {
     let mean = a.trace() / as_number(a.nrows());
     let distance = |value: &Complex<f64>| (value - Complex::new(mean, 0.0)).norm();

@@ -7,7 +7,8 @@ use crate::check::as_number;
 use crate::svd::Svd;
 use nalgebra::DMatrix;
 
-/// The rounding error of an eigenvalue, divided by n^2 and the largest entry of the matrix, with a safety margin.
+/// Bound of the rounding error of an eigenvalue, relative to n^2 times the largest entry of the n x n matrix; includes
+/// a safety margin.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// The definiteness margin of a symmetric matrix S: the smallest eigenvalue of D S D, D the
@@ -31,7 +32,7 @@ pub(crate) fn margin(s: &DMatrix<f64>) -> Result<f64, Error> {
     Ok(if smallest > ROUNDING * order * order * size { smallest } else { 0.0 })
 }
 
-/// The smallest eigenvalue of a positive definite matrix; None for any other.
+/// The smallest eigenvalue of a positive definite matrix; None if the matrix is not positive definite.
 ///
 /// The symmetric part of `s` is taken. Method: Cholesky factor, squares of its singular values.
 pub(super) fn smallest_eigenvalue(s: &DMatrix<f64>) -> Result<Option<f64>, Error> {

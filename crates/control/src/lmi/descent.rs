@@ -10,7 +10,7 @@ use crate::response::h_infinity;
 use nalgebra::{DMatrix, DVector};
 
 const ITERATIONS: usize = 80;
-/// Iterations in which the norm must decrease by `PROGRESS`.
+/// The descent ends when the norm decreases by less than `PROGRESS` in this number of iterations.
 const PATIENCE: usize = 8;
 const PROGRESS: f64 = 2e-3;
 const SEARCHES: usize = 25;

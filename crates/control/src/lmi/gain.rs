@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 /// verified.
 const RELAXED_LEVELS: [f64; 4] = [1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
 
-/// A level below `WEAK`, with B and C of about one, is not large compared with the margin of the inequalities. Then the
+/// For a level below `WEAK`, with B and C scaled to about one, the margin of the inequalities is not negligible: the
 /// coordinates are refined, up to `REFINEMENTS` times.
 const WEAK: f64 = 2e-3;
 const REFINEMENTS: usize = 3;
@@ -60,7 +60,7 @@ pub(super) struct GainInequality {
     pub(super) output: Affine,
     /// D, r x k.
     pub(super) feedthrough: Affine,
-    /// gamma for H-infinity, gamma^2 for the other norms.
+    /// The bound in the inequalities: gamma for H-infinity, gamma^2 for the other norms.
     pub(super) level: Affine,
 }
 
@@ -159,7 +159,7 @@ impl GainScaling {
         self.gain() * if self.norm == Norm::HInfinity { level } else { level.sqrt() }
     }
 
-    /// The factor of P between the solver's units and those of the data.
+    /// Factor that converts P from the units of the solver to the units of the data.
     fn certificate(&self) -> f64 {
         match self.norm {
             Norm::HInfinity => self.output / (self.disturbance * self.unit),
@@ -242,8 +242,8 @@ pub fn certify_gain(system: &StateSpace, norm: Norm) -> Result<Outcome<GainBound
     }
 }
 
-/// [`certify_gain`] with the program solved in given coordinates; if the level is below [`WEAK`], also in coordinates
-/// in which P is the identity.
+/// Same as [`certify_gain`], with the program solved in `coordinates`; if the level is below [`WEAK`], also in
+/// coordinates in which P is the identity.
 pub(super) fn certify_in(
     coordinates: Coordinates,
     system: &StateSpace,
@@ -300,7 +300,7 @@ impl<'a> BoundProblem<'a> {
         Self { system, norm, coordinates, scaling }
     }
 
-    /// The program and its P at a given level, or with the level minimised.
+    /// The semidefinite program and its unknown P, for a given level or with the level minimised.
     fn problem(&self, level: Option<f64>) -> (Problem, Affine) {
         let (system, coordinates) = (self.system, &self.coordinates);
         let mut problem = Problem::new();
@@ -322,7 +322,7 @@ impl<'a> BoundProblem<'a> {
         (problem, p)
     }
 
-    /// The smallest level and its P; None if the solver fails.
+    /// The smallest level and the P that proves it; None if the solver fails.
     fn minimum(&self) -> Option<(f64, DMatrix<f64>)> {
         let (problem, p) = self.problem(None);
         let (smallest, unknowns) = problem.minimum()?;

@@ -187,8 +187,8 @@ impl HiddenDisturbance {
         self.verified(&symmetric_part(&(&map * covariance.evaluate(&unknowns) * map.transpose())))
     }
 
-    /// The root of the ratio of the energies of z and w for a covariance of (x, d); None if its inequalities do not
-    /// hold by more than rounding errors.
+    /// The root of the ratio of the energies of z and w for a covariance of (x, d); None unless the inequalities of the
+    /// covariance hold by more than rounding errors.
     fn verified(&self, covariance: &DMatrix<f64>) -> Result<Option<f64>, Error> {
         let growth = self.growth(&Affine::constant(covariance)).constant;
         if margin(covariance)? <= 0.0 || margin(&growth)? <= 0.0 {
@@ -219,7 +219,8 @@ impl HiddenDisturbance {
         }
     }
 
-    /// The matrices M for which tr(M H) is the energy of z (in sampled time at the next sample), and of w.
+    /// The two matrices M for which tr(M H), with H the covariance of (x, d), is the energy of z (in sampled time at
+    /// the next sample) and the energy of w.
     fn energies(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         let (order, free) = self.b.shape();
         let whole = order + free;

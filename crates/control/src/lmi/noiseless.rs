@@ -15,7 +15,8 @@ const ON_THE_LIMIT: f64 = 1e-7;
 const REMAINDER: f64 = 1e-9;
 /// Relative reduction of a bound that allows for rounding errors.
 pub(super) const ROUNDING: f64 = 1e-6;
-/// Steps of the iteration for the sign of a matrix, and the relative change that ends it.
+/// Largest number of steps of the iteration for the sign of a matrix; a relative change below [`SETTLED`] ends it
+/// earlier.
 const STEPS: usize = 100;
 const SETTLED: f64 = 1e-13;
 

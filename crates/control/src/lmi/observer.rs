@@ -25,7 +25,8 @@ const LARGEST: f64 = 1e6;
 
 const OUT_OF_RANGE: &str = "a gain exists, but none could be proven in double precision";
 
-/// A gain that the solver found, not yet proven, and coordinates in which its P is the identity.
+/// A gain that the solver found but that is not proven yet, and coordinates in which the P of the solver is the
+/// identity.
 pub(super) struct Candidate {
     pub(super) gain: DMatrix<f64>,
     pub(super) coordinates: Coordinates,
@@ -169,7 +170,7 @@ impl<'a> ObserverProgram<'a> {
         Self { requirements, coordinates, extended, units }
     }
 
-    /// The coordinates of the inequalities of the norm, with the states of the weights.
+    /// The coordinates of the inequalities of the norm, including the states of the weights.
     fn norm_coordinates(&self) -> &Coordinates {
         self.extended.as_ref().unwrap_or(&self.coordinates)
     }

@@ -63,7 +63,7 @@ struct Requirement {
 }
 
 impl Requirement {
-    /// (S(x) - m I) / size - slack I, with a power of two near the largest entry of S as the size; 1 for S = 0.
+    /// (S(x) - m I) / size - slack I; size is a power of two near the largest entry of S, or 1 for S = 0.
     fn semidefinite(&self, slack: Option<&Affine>) -> Affine {
         let size = power_of_two(self.matrix.largest_entry());
         let size = if size.is_normal() { size } else { 1.0 };
@@ -252,7 +252,8 @@ impl Problem {
         names
     }
 
-    /// The solution; None without unknowns, or if a requirement does not keep at least half of its margin.
+    /// The solution with the given unknowns; None without unknowns, or if a requirement keeps less than half of its
+    /// margin.
     fn verified(&self, unknowns: Option<DVector<f64>>) -> Result<Option<Solution>, Error> {
         let Some(unknowns) = unknowns else { return Ok(None) };
         let mut margins = Vec::with_capacity(self.requirements.len());

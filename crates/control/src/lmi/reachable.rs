@@ -12,12 +12,12 @@ use crate::stability::instability;
 use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
 
-/// Factors of Q that are tried in turn until its inequalities hold by more than rounding errors.
+/// Factors by which Q is enlarged, tried in turn until the inequalities of Q hold by more than rounding errors.
 const ENLARGEMENTS: [f64; 5] = [1.0, 1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
 /// Weight of the trace of Q in the objective of [`common_reachable_set`].
 const REGULARISATION: f64 = 1e-6;
-/// If c Q c' / |c|^2 of an output c is below this in the solver's coordinates, it is not large compared with
-/// [`MARGIN`]. Then the program is solved in coordinates in which the smallest Q of the mean matrix is the identity.
+/// If c Q c' / |c|^2 of an output row c is below this in the coordinates of the solver, [`MARGIN`] is not negligible:
+/// the program is solved in coordinates in which the smallest Q of the mean matrix is the identity.
 const WEAK: f64 = 1e-4;
 const NOT_PROVEN: &str = "no common ellipsoid could be proven in double precision";
 
@@ -216,8 +216,8 @@ impl Reachability {
     }
 }
 
-/// The sum of c Q c' over the rows c of `outputs`, each relative to its value for `q_of_mean`, and a little of
-/// the trace of Q, which bounds the other directions.
+/// The sum of c Q c' over the rows c of `outputs`, each relative to its value for `q_of_mean`. A small multiple of the
+/// trace of Q is added, which bounds Q in the other directions.
 fn objective(q: &Affine, outputs: &DMatrix<f64>, q_of_mean: &DMatrix<f64>) -> Affine {
     let n = q_of_mean.nrows();
     let mut weight = DMatrix::from_diagonal_element(n, n, REGULARISATION / q_of_mean.trace());

@@ -18,9 +18,9 @@ pub(super) const NO_P: &str = "the region could not be proven in double precisio
 /// A disc around a real number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
-    /// Its centre on the real axis.
+    /// Centre of the disc, on the real axis.
     pub center: f64,
-    /// Its radius, above zero.
+    /// Radius of the disc, above zero.
     pub radius: f64,
 }
 
@@ -52,10 +52,10 @@ pub struct RegionCertificate {
 
 /// A part of a region.
 enum Shape {
-    /// Re s < -decay, with the decay rate.
+    /// Re s < -decay; contains the decay rate.
     HalfPlane(f64),
     Disc(Disc),
-    /// |Im s| < tan(angle) (-Re s), with the half angle in rad.
+    /// |Im s| < tan(angle) (-Re s); contains the half angle in rad.
     Sector(f64),
 }
 
@@ -80,7 +80,7 @@ impl Region {
         check::that(is_in_range && domain == Domain::Continuous, "sector", angle, rule)
     }
 
-    /// The parts with the names by which a conflict reports them, for s or z divided by `unit`.
+    /// The parts of the region for s or z divided by `unit`, each with its name in reported conflicts.
     fn parts(&self, domain: Domain, unit: f64) -> Vec<(&'static str, Shape)> {
         let disc = |center: f64, radius: f64| {
             Shape::Disc(Disc { center: center / unit, radius: radius / unit })

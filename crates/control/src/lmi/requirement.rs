@@ -35,7 +35,7 @@ pub struct Synthesis {
 }
 
 impl Performance {
-    /// Checks the matrices for n states, with a feedthrough of the given shape, and that the bound is above zero.
+    /// Checks that the matrices fit n states and a feedthrough of the given shape, and that the bound is above zero.
     pub(super) fn check(&self, n: usize, feedthrough: (usize, usize)) -> Result<(), Error> {
         check::shape("disturbance", &self.disturbance, (n, self.disturbance.ncols()))?;
         check::shape("output", &self.output, (self.output.nrows(), n))?;

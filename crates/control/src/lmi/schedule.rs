@@ -10,7 +10,7 @@ use crate::eigen::eigenvalues;
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
-/// Factor between the rates that [`largest_change`] tries, their number, and the bisections after them.
+/// Factor between successive rates that [`largest_change`] tries: [`RATES`] rates, then [`BISECTIONS`] bisections.
 const FACTOR: f64 = 0.25;
 const RATES: i32 = 7;
 const BISECTIONS: usize = 3;
@@ -35,8 +35,8 @@ pub struct Interval {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ScheduleCertificate {
-    /// The largest change of theta in a sample, in the unit of theta; in continuous time its largest
-    /// rate, in this unit per s.
+    /// The largest change of theta in a sample, in the unit of theta; in continuous time the largest rate of change of
+    /// theta, in the unit of theta per s.
     pub change: f64,
     /// P at each grid point, n x n: one more than intervals.
     pub p: Vec<DMatrix<f64>>,
@@ -271,7 +271,8 @@ fn product(
     product
 }
 
-/// The Bernstein coefficients of -(A' P + P A + D) in continuous time, for both D of each interval.
+/// The Bernstein coefficients of -(A' P + P A + D) in continuous time on each interval, for
+/// D = `rate` dP/dtheta and for D = -`rate` dP/dtheta.
 fn decays(intervals: &[Interval], p: &[Affine], rate: f64) -> Vec<Affine> {
     let mut all = Vec::new();
     for (i, Interval { coefficients: a, length }) in intervals.iter().enumerate() {

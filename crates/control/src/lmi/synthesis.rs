@@ -162,8 +162,8 @@ pub(super) fn strictly_proper(
 
 /// Proves region and bound for the closed loop with a candidate gain.
 ///
-/// Each certificate is computed in the coordinates of the candidate first, then in those that suit
-/// the closed-loop dynamics.
+/// Each certificate is computed in the coordinates of the candidate and, if that fails, in coordinates that suit the
+/// closed-loop dynamics.
 pub(super) fn prove(
     candidate: Candidate,
     dynamics: &DMatrix<f64>,

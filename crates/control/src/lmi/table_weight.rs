@@ -25,7 +25,7 @@ type Quotient = (Vec<f64>, Vec<f64>);
 pub struct TableWeight {
     /// The weight.
     pub weight: Weight,
-    /// The largest factor between its magnitude and the table's, at least 1.
+    /// The largest factor between the magnitudes of the weight and of the table, at least 1.
     pub deviation: f64,
 }
 

@@ -156,8 +156,8 @@ pub(super) fn order(first: Option<&DMatrix<f64>>) -> Result<usize, Error> {
     check::square("A", first.ok_or(Error::Empty { matrix: "A", actual: (0, 0) })?)
 }
 
-/// The members that contradict each other, each of them necessary, the first ones if there is a choice;
-/// inconclusive if the program of all members is not infeasible.
+/// The members that contradict each other: each is necessary for the contradiction, and early members are preferred.
+/// Inconclusive if the program of all members is not infeasible.
 fn contradiction<T>(
     all: Vec<usize>,
     program: impl Fn(&[usize]) -> Problem,
@@ -334,8 +334,8 @@ impl CommonSearch<'_> {
         }
     }
 
-    /// Gains K, the preferred one first, with coordinates in which their P is the identity: the most interior
-    /// gain for a norm of Z up to twice the smallest, and the gain of the smallest norm of Z.
+    /// Candidate gains K, each with coordinates in which its P is the identity: first the most interior gain for a norm
+    /// of Z up to twice the smallest, then the gain of the smallest norm of Z.
     fn candidates(
         &self,
         program: &Program,

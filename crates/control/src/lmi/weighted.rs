@@ -16,7 +16,7 @@ const LOOSE: f64 = 1.01;
 /// Of the gains with a norm up to this factor above the least one, the smallest gain is chosen.
 const NEARLY_LEAST: f64 = 1.05;
 
-/// Weights of a norm from w to z: the norm is that of `output` G `input`.
+/// Weights of a norm from w to z: the weighted norm of a system G is the norm of `output` G `input`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelWeights {
     /// From the weighted disturbance to w, k x k.

@@ -45,8 +45,8 @@ pub struct LossyLoop {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ConstantLimit {
-    /// The factor of the box up to which the loop is stable; the argument `most` if it is stable in the whole box, 0 if
-    /// it is not stable without loss.
+    /// The factor by which the box of losses may be scaled while the loop is stable: the argument `most` if the loop is
+    /// stable in the whole box, 0 if the loop is unstable without losses.
     pub factor: f64,
     /// The losses at which the loop becomes unstable; the least stable of the tested losses on the far faces
     /// of the box if the loop is stable in the whole box.
@@ -138,8 +138,8 @@ impl LossyLoop {
         Ok(limit)
     }
 
-    /// The largest t, at most `end`, such that the loop is stable at the tested losses up to t times
-    /// `direction`; 0 if it is not stable without loss.
+    /// The largest t, at most `end`, such that the loop is stable at the tested losses up to t times `direction`; 0 if
+    /// the loop is unstable without losses.
     pub(super) fn stability_limit(&self, direction: &[f64], end: f64) -> Result<f64, Error> {
         let stable = |t: f64| {
             let loss: Vec<f64> = direction.iter().map(|part| part * t).collect();
@@ -194,8 +194,8 @@ pub(super) fn grid(largest: &[f64], points: usize) -> Vec<Vec<f64>> {
     })
 }
 
-/// The points on the far faces of the box, where an input has its largest loss, of a grid with up to 11 points for each
-/// input, such that the faces have at most 70 points.
+/// The points of a grid on the far faces of the box, where at least one input has its largest loss. The grid has at
+/// most 11 points for each input, fewer if the faces would have more than 70 points.
 fn directions(largest: &[f64]) -> Vec<Vec<f64>> {
     let lossy = largest.iter().filter(|loss| **loss > 0.0).count();
     let power = |base: usize| base.pow(u32::try_from(lossy).unwrap_or(u32::MAX));

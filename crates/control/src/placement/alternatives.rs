@@ -5,8 +5,8 @@ use crate::Error;
 use crate::svd::norm_2;
 use nalgebra::{Complex, DMatrix};
 
-/// The factor by which condition number and gain of a candidate for a pair of feedback and observer may exceed
-/// the lower ones of the standard methods.
+/// The factor by which condition number and gain of a candidate may exceed the lower values of the standard methods;
+/// the candidates form pairs of feedback and observer.
 const NEAR: f64 = 1.09;
 
 /// Feedbacks that assign the same eigenvalues by different eigenvectors.
@@ -15,8 +15,8 @@ const NEAR: f64 = 1.09;
 pub struct Alternatives {
     /// The result of [`super::place`], or of its variant.
     pub chosen: Placement,
-    /// The other placements, the lowest peak of S first, at most 20, above 24 states at most 2. Condition number
-    /// and gain of each are at most 9 % above the least ones of eigenvectors of largest volume.
+    /// The other placements in ascending order of the peak of S: at most 20, above 24 states at most 2. Condition
+    /// number and gain of each exceed the least values of eigenvectors of largest volume by at most 9 %.
     pub others: Vec<Placement>,
     /// The results, for up to 24 states, of two standard methods: first of method 0 of Kautsky, Nichols and Van
     /// Dooren, which needs real eigenvalues, then of the method of Tits and Yang, each with start and end as in

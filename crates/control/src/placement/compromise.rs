@@ -5,12 +5,13 @@ use super::figures::{COUNT, FeedbackLoop, Weighting};
 use crate::Error;
 use nalgebra::DVector;
 
-/// Factors by which the figures of the first candidate may exceed their references.
+/// The first candidate is kept if its condition number, gain and peak of S exceed their references by at most these
+/// factors.
 const ACCEPTABLE: Figures = [1.11, 1.11, 1.02];
-/// The same for condition number and gain of directions among which the least peak of S is searched.
+/// Factor by which condition number and gain may exceed their references in the search for the least peak of S.
 const LIMIT: f64 = 1.05;
-/// A candidate with a figure below the least figure of largest volume lowers the reference, down to this fraction
-/// of that figure.
+/// A candidate with a figure below its least value of largest volume lowers the reference, down to this fraction of the
+/// least value.
 const MARGIN: f64 = 0.9;
 /// Sharpness of the smooth maximum over the figures and of the smooth limits.
 const SHARPNESS: f64 = 40.0;
@@ -19,10 +20,9 @@ const PENALTY: f64 = 10.0;
 /// Relative decrease at which a descent ends.
 const TOLERANCE: f64 = 1e-3;
 
-/// The factor by which condition number and gain of an alternative may exceed the least ones of directions of
-/// largest volume.
+/// The factor by which condition number and gain of an alternative may exceed their least values of largest volume.
 const ALTERNATIVE: f64 = 1.09;
-/// Directions count as the same if all their figures agree to this relative difference.
+/// Two sets of directions count as the same if all their figures agree to this relative difference.
 const SAME: f64 = 1e-4;
 /// Number of descents of the peak of S.
 const DESCENTS: usize = 5;
@@ -104,7 +104,7 @@ impl<'a> Search<'a> {
     /// Returns the directions of all searches, and of `more` (of largest volume), that differ from `chosen` and from
     /// each other, the lowest peak of S first.
     ///
-    /// Their condition number and gain are at most 9 % above the least ones of largest volume.
+    /// Condition number and gain of each result exceed their least values of largest volume by at most 9 %.
     pub(crate) fn others(
         mut self,
         chosen: &Directions,
@@ -141,8 +141,8 @@ impl<'a> Search<'a> {
         Ok((exact, smooth))
     }
 
-    /// The directions of least peak of S within the limits of condition number and gain; if there are
-    /// none, those nearest to the references of both.
+    /// The directions of least peak of S within the limits of condition number and gain; if there are none, the
+    /// directions nearest to both references.
     fn least_peak(&self, reference: Figures) -> Option<&(Figures, Directions)> {
         let excess = |figures: Figures| {
             let largest = ratio(figures, [reference[0], reference[1], f64::INFINITY]);
@@ -177,13 +177,13 @@ fn is_same(a: Figures, b: Figures) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME * b)
 }
 
-/// The largest figure relative to its reference.
+/// The largest ratio of a figure to its reference.
 fn ratio(figures: Figures, reference: Figures) -> f64 {
     figures.iter().zip(reference).map(|(figure, reference)| figure / reference).fold(0.0, f64::max)
 }
 
-/// ln(sum of e^(k x)) / k of the differences x from the reference, which is near the largest of them, with
-/// k = `SHARPNESS`, and its partial derivatives.
+/// A smooth maximum of the differences x between the figures and their references, ln(sum of e^(k x)) / k with k =
+/// `SHARPNESS`, and its partial derivatives.
 fn smooth_maximum(figures: &Figures, reference: &Figures) -> (f64, Figures) {
     let excess: Figures = std::array::from_fn(|figure| figures[figure] - reference[figure]);
     let largest = excess.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -7,8 +7,8 @@ use crate::balance::{divide_columns, divide_rows, multiply_columns, multiply_row
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
-/// An eigenvector counts as dependent when its component normal to the previous ones is below this
-/// fraction.
+/// An eigenvector counts as linearly dependent if its component normal to the previous eigenvectors is below this
+/// fraction of its length.
 const DEPENDENT: f64 = 1e-14;
 
 /// Computes K such that A + B K has the requested eigenvalues, with eigenvectors as near to the

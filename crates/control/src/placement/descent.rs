@@ -8,7 +8,8 @@ const TRIALS: usize = 20;
 const ENOUGH: f64 = 1e-4;
 /// Largest fraction of the slope that may remain after a step.
 const FLATTER: f64 = 0.9;
-/// Relative rounding error of a value; within it a step is accepted if it reduces the slope.
+/// Relative rounding error of the function; a step that changes the function by less is accepted if it reduces the
+/// slope.
 const NOISE: f64 = 1e-15;
 /// The descent ends when this many iterations lower the value by less than the tolerance.
 const PATIENCE: usize = 10;

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 /// Number of starts of the search for the largest volume, and of results from which the condition number is minimised.
 const STARTS: usize = 6;
 const DESCENTS: usize = 3;
-/// A later start is preferred only if it is better by more than rounding.
+/// A later start is preferred only if it is better by this factor, so that rounding errors do not decide.
 const BETTER: f64 = 1.0 - 1e-5;
 const SWEEPS: usize = 20;
 const ROUNDS: usize = 5;
@@ -129,12 +129,12 @@ fn widest(space: &AssignableSubspace, normals: &DMatrix<f64>) -> Result<DVector<
     Ok(if size(&highest) >= size(&lowest) { highest } else { lowest })
 }
 
-/// The value of a function of directions and its gradients.
+/// The value of a function of directions, and its gradients with respect to the eigenvectors V and the responses G.
 pub(crate) struct Slope {
     pub(crate) value: f64,
     /// With respect to the eigenvectors V.
     pub(crate) of_v: DMatrix<f64>,
-    /// With respect to the responses of the problem, r rows; None if the function does not depend on them.
+    /// The gradient with respect to the responses G, r rows; None if the function does not depend on G.
     pub(crate) of_g: Option<DMatrix<f64>>,
 }
 
@@ -165,7 +165,8 @@ pub(crate) fn descend(
     Ok(directions)
 }
 
-/// ln(s1 / sn) of the singular values of the eigenvector matrix V = sum of s x u', and its gradient: ds = x' dV u.
+/// ln(s1 / sn) of the eigenvector matrix V = sum of s x u' (singular value decomposition), and its gradient, from ds =
+/// x' dV u.
 fn condition_slope(problem: &AssignableSubspaces, directions: &[DVector<f64>]) -> Option<Slope> {
     let v = Svd::new(&problem.eigenvectors(directions).transpose()).ok()?;
     let last = v.values.len() - 1;

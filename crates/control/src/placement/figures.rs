@@ -12,8 +12,8 @@ use std::f64::consts::PI;
 
 /// Number of figures.
 pub(crate) const COUNT: usize = 3;
-/// Frequencies for each decade at which S is evaluated, from a tenth of the slowest eigenvalue to
-/// ten times the fastest, in sampled time to half of the sample rate, and their largest number.
+/// Number of frequencies per decade at which S is evaluated, in total at most [`MOST_FREQUENCIES`]: from a tenth of the
+/// slowest eigenvalue to ten times the fastest, in sampled time to half of the sample rate.
 const PER_DECADE: f64 = 12.0;
 const MOST_FREQUENCIES: f64 = 80.0;
 /// Exponent of the sum of powers over the frequencies that replaces the maximum in the descent.
@@ -32,7 +32,7 @@ pub(crate) type Weighting<'a> = dyn Fn(&[f64; COUNT]) -> (f64, [f64; COUNT]) + '
 pub(crate) struct FeedbackLoop<'a> {
     /// The problem whose eigenvectors are chosen.
     pub(crate) problem: &'a AssignableSubspaces,
-    /// X, for which the columns of B X are orthonormal: G is X times the responses of `problem`.
+    /// X, with which the columns of B X are orthonormal; G is X times the responses of `problem`.
     basis: &'a DMatrix<f64>,
     b: &'a DMatrix<f64>,
     /// The points s, or z, of the frequencies; empty if a requested eigenvalue is unstable.
@@ -69,7 +69,7 @@ impl<'a> FeedbackLoop<'a> {
         self.problem.spaces.iter().map(|space| space.poles)
     }
 
-    /// The eigenstructure of these directions; None if the eigenvectors are dependent.
+    /// The eigenvectors and responses of `directions`; None if the eigenvectors are dependent.
     fn eigenstructure(&self, directions: &[DVector<f64>]) -> Option<Eigenstructure> {
         let v = self.problem.eigenvectors(directions);
         let inverse = self.problem.inverse(directions)?;

@@ -11,7 +11,7 @@ use nalgebra::{Complex, DMatrix};
 /// same.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PoleBlock {
-    /// p, its imaginary part not below zero.
+    /// The eigenvalue p of the block, with an imaginary part of at least zero.
     pub(crate) pole: Complex<f64>,
 }
 

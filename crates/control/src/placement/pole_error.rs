@@ -39,8 +39,8 @@ impl PlacementProblem<'_> {
         Ok(worst)
     }
 
-    /// For each requested eigenvalue its distance from the origin, 0 or in sampled time 1. If this is zero: the largest
-    /// distance, or the norm of A (in sampled time of A - I) if all distances are zero.
+    /// For each requested eigenvalue, the reference of its error: its distance from 0 (in sampled time from 1). A zero
+    /// distance is replaced by the largest distance or, if all are zero, by the norm of A (in sampled time of A - I).
     fn references(&self) -> Vec<f64> {
         let (a, origin) = (self.a, if self.sampled { 1.0 } else { 0.0 });
         let distances: Vec<f64> =

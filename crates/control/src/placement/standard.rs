@@ -8,7 +8,7 @@ use crate::svd::Svd;
 use crate::{Error, reflections::Reflections};
 use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
 
-/// Number of sweeps over all eigenvectors, and the relative change of their determinant that ends them earlier.
+/// Largest number of sweeps over all eigenvectors; a relative change of their determinant below [`CHANGE`] ends them.
 const SWEEPS: usize = 30;
 const CHANGE: f64 = 1e-3;
 /// Relative and absolute difference of singular values that count as equal; entries up to `ZERO` count as
@@ -61,17 +61,17 @@ struct Iteration {
     /// One column for each real eigenvalue, in ascending order; then real and imaginary part for each
     /// pair, of the eigenvalue with positive imaginary part.
     vectors: DMatrix<f64>,
-    /// For each column the orthonormal basis of the subspace of its eigenvalue.
+    /// For each column of `vectors`, an orthonormal basis of the subspace of eigenvectors for its eigenvalue.
     kernels: Vec<ComplexMatrix>,
     /// Number of real eigenvalues.
     reals: usize,
-    /// The spaces in the order of their columns: real eigenvalues first.
+    /// Indices of the subspaces in the order of the columns: real eigenvalues first.
     order: Vec<usize>,
 }
 
 impl Iteration {
-    /// The start of scipy: for each eigenvalue p the sum of the basis of the x with N' (A - p I) x = 0, the columns of
-    /// N normal to those of B; for r = n the unit vectors.
+    /// The start of scipy: for each eigenvalue p, the sum of the basis vectors of the null space of N' (A - p I), where
+    /// the columns of N are normal to the columns of B. For r = n the start is the unit vectors.
     fn new(a: &DMatrix<f64>, b: &DMatrix<f64>, problem: &AssignableSubspaces) -> Self {
         let (n, r) = b.shape();
         let count = |number: &usize| problem.spaces[*number].poles.count();
@@ -131,7 +131,7 @@ impl Iteration {
         self.kernels[column].map(|entry| entry.re)
     }
 
-    /// Replaces column j by the projection, onto its subspace, of the normal of the plane that the others span.
+    /// Replaces column j: the normal of the plane that the other columns span, projected onto the subspace of column j.
     fn improve_one(&mut self, j: usize) {
         let kernel = self.kernel(j);
         let projection = &kernel * kernel.tr_mul(&self.normals(&[j]));
@@ -140,7 +140,8 @@ impl Iteration {
         }
     }
 
-    /// Replaces columns i and j by the x and y of the largest x' (u v' - v u') y, u and v normal to the others.
+    /// Replaces columns i and j by the vectors x and y of their subspaces with the largest x' (u v' - v u') y, where u
+    /// and v are normal to the other columns.
     fn improve_two(&mut self, i: usize, j: usize) -> Result<(), Error> {
         let n = self.vectors.nrows();
         let normals = self.normals(&[i.min(j), i.max(j)]);
@@ -166,8 +167,8 @@ impl Iteration {
         Ok(())
     }
 
-    /// Replaces columns i and i + 1 by the real and the imaginary part of the eigenvector that spans the largest
-    /// volume with the others.
+    /// Replaces columns i and i + 1 by the real and the imaginary part of the eigenvector that spans the largest volume
+    /// with the other columns.
     fn improve_pair(&mut self, i: usize) -> Result<(), Error> {
         let normals = self.normals(&[i, i + 1]);
         let kernel = &self.kernels[i];

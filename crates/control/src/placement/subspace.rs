@@ -166,7 +166,8 @@ pub(crate) fn equations(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: PoleBlock) ->
     beside(&shifted, &one.kronecker(b))
 }
 
-/// An orthonormal basis of the null space of a matrix with independent rows; its small entries are precise, too.
+/// An orthonormal basis of the null space of a matrix with independent rows; small entries of the basis are precise,
+/// too.
 pub(crate) fn basis(equations: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
     let (rank, all) = equations.shape();
     Ok(Svd::new(equations)?.right.columns(rank, all - rank).into())

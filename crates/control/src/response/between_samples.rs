@@ -74,11 +74,12 @@ struct Lifted<'a> {
     entry: DMatrix<f64>,
 }
 
-/// The effects of an input over one interval: on x at its end and at the start of each part, and on eps.
+/// The effects of an input over one sample interval: on x at the end of the interval and at the start of each part, and
+/// on eps.
 struct Effects {
     /// For each part of the input: its effect on x[k+1], n + filters rows.
     states_after: Vec<DMatrix<f64>>,
-    /// Whether the observer knows this effect on x[k+1], so that e[k+1] does not have it.
+    /// Whether the observer knows the effect on x[k+1]; then the error e[k+1] does not contain it.
     is_known: bool,
     /// [i][j]: the effect of part j of the input on x at the start of part i.
     outputs: Vec<Vec<DMatrix<f64>>>,

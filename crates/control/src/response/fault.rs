@@ -5,7 +5,7 @@ use crate::faulty_plant::FaultyPlant;
 use crate::gains::Gains;
 use crate::{Domain, Error, check};
 
-/// Relative width of the brackets of the peak gains; [`FaultBounds`] uses their upper ends.
+/// Relative width of the brackets of the peak gains; [`FaultBounds`] uses the upper end of each bracket.
 const WIDTH: f64 = 1e-3;
 
 /// Bounds of states and errors at all times, for faults that start from rest; each in the unit of its quantity.

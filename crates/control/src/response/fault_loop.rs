@@ -46,7 +46,8 @@ pub fn fault_system(
     Ok(StateSpace { a: loop_dynamics(plant, gains, domain), b, c, d, domain })
 }
 
-/// Appends to `b`, the effect of a fault on [x; e; `f_hat`], its effect on the integrals: `factor` H `F_s`.
+/// Appends to `b`, the effect of a fault on [x; e; `f_hat`], the effect of the fault on the integrals: `factor` H
+/// `F_s`.
 pub(super) fn with_integrals(gains: &Gains, b: &DMatrix<f64>, factor: f64) -> DMatrix<f64> {
     let none = DMatrix::zeros(0, b.ncols());
     stacked(b, &gains.integral.as_ref().map_or(none, |integral| &integral.faults * factor))
@@ -138,7 +139,7 @@ pub(super) fn require_rows(plant: &FaultyPlant, rows: &[usize]) -> Result<(), Er
     Err(Error::OutOfRange { name: "rows", value: check::as_number(*row), rule })
 }
 
-/// C of both systems, from the state to [x; e; `f_hat` or eps]: I without a direct term and integrals.
+/// C of the systems with output [x; e; `f_hat`] and [x; e; eps]: I without a direct term and integrals.
 pub(super) fn outputs(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
     let (n, q) = plant.f_a.shape();
     let mut c = DMatrix::identity(2 * n + q, 2 * n + q + gains.integrals());
@@ -148,9 +149,9 @@ pub(super) fn outputs(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
     c
 }
 
-/// The state matrix of both systems: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`]; with a direct
-/// term -B `K_x` + B `K_f` `P_f` C in place of -B `K_x`; with integral action the rows and columns of `x_i`
-/// follow.
+/// The state matrix of the systems with output [x; e; `f_hat`] and [x; e; eps]: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0,
+/// `A_0` - L `C_0`]; with a direct term -B `K_x` + B `K_f` `P_f` C in place of -B `K_x`; with integral action the rows
+/// and columns of `x_i` follow.
 pub(super) fn loop_dynamics(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> DMatrix<f64> {
     let (n, q) = plant.f_a.shape();
     let (first, t) = (2 * n + q, gains.integrals());

@@ -18,7 +18,7 @@ pub struct FrequencyPoint {
     /// G = C (s I - A)^-1 B + D, p x m, s = j w; in sampled time with the period h, s is replaced by
     /// z = e^(j w h).
     pub gain: DMatrix<Complex<f64>>,
-    /// The singular values of G, descending; their number is the smaller one of p and m.
+    /// The min(p, m) singular values of G, descending.
     pub singular_values: Vec<f64>,
 }
 
@@ -61,7 +61,7 @@ pub fn frequency_response(
     frequencies.iter().map(point).collect()
 }
 
-/// The singular values of a complex matrix, descending; their number is the smaller one of rows and columns.
+/// The singular values of a complex matrix, descending, as many as the smaller one of its dimensions.
 pub(crate) fn singular_values(gain: &DMatrix<Complex<f64>>) -> Result<Vec<f64>, Error> {
     let is_wide = gain.nrows() < gain.ncols();
     let svd = if is_wide { ComplexSvd::new(&gain.transpose()) } else { ComplexSvd::new(gain) };
@@ -212,7 +212,7 @@ impl Parts {
         self.im.swap_columns(one, other);
     }
 
-    /// Subtracts `factor` times the column `source` from the column `target`, in these rows.
+    /// Subtracts `factor` times column `source` from column `target` in the rows `rows`.
     fn subtract(&mut self, target: usize, factor: Complex<f64>, source: usize, rows: Range<usize>) {
         let Complex { re, im } = factor;
         let (mut to_re, from_re) = self.re.columns_range_pair_mut(target, source);

@@ -25,7 +25,7 @@ const SMALLEST_STEP: f64 = 0.02;
 pub struct HInfinity {
     /// Lower bound: the largest singular value that was evaluated.
     pub lower: f64,
-    /// Upper bound: the largest singular value is below it at every frequency, up to rounding.
+    /// Upper bound of the largest singular value at every frequency, up to rounding.
     pub upper: f64,
     /// The frequency of `lower` in rad per unit of time; infinite for the D of a continuous system.
     pub frequency: f64,
@@ -114,8 +114,8 @@ pub(crate) fn norm_of(known: &KnownResponse, width: f64) -> Result<HInfinity, Er
 }
 
 impl HInfinity {
-    /// Raises the lower bound to the local maximum near its frequency, which saves eigenvalues of Hamiltonian matrices.
-    /// The steps of the frequency grow while the value rises; otherwise they change their sign and shrink.
+    /// Raises the lower bound to the local maximum near its frequency, which saves eigenvalue problems of Hamiltonian
+    /// matrices. The frequency steps grow while the value rises; otherwise they reverse and shrink.
     fn climb(&mut self, known: &KnownResponse, width: f64) -> Result<(), Error> {
         let last = original_frequency(f64::INFINITY, known.system.domain);
         if self.frequency <= 0.0 || self.frequency >= last {

@@ -10,11 +10,12 @@ use std::f64::consts::TAU;
 const LONGEST: u32 = 24;
 /// The approximate number of contractions by half that a sum needs.
 const HALVINGS: f64 = 12.0;
-/// Intervals that [`super::peak_gain`] needs for an impulse response, and for each of its oscillations.
+/// Number of intervals that [`super::peak_gain`] needs for an impulse response, and for each oscillation of the
+/// response.
 const INTERVALS: [f64; 2] = [500.0, 50.0];
 /// The number of different lengths of the intervals of `peak_gain`.
 const LENGTHS: f64 = 30.0;
-/// A sum is complete when the state is below this part, times the width, of the first state.
+/// A sum is complete when the state, relative to the first state, is below this times the required width.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// Bounds of |D| + the sum over k of |C A^k B|, entry by entry.

@@ -7,7 +7,8 @@ use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector, DVectorView};
 use std::rc::Rc;
 
-/// The shortest interval of continuous time, relative to the norm of A; h is nearly linear over it.
+/// Length of the shortest interval in continuous time, divided by the time constant 1 / |A|; the impulse response is
+/// nearly linear over it.
 const SHORTEST: f64 = 1.0 / 4096.0;
 /// Relative rounding error of a product of a row and a state, the errors of the doublings included.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -18,10 +19,10 @@ const LENGTHS: usize = 120;
 pub(super) struct Length {
     /// Time, or number of samples.
     pub(super) time: f64,
-    /// The state at the end, the same for all outputs.
+    /// The matrix from the state at the start to the state at the end, the same for all outputs.
     pub(super) phi: Rc<DMatrix<f64>>,
-    /// R, r x n, with |R x|^2 the integral of h^2, and below it a row s with s x the integral of h: one matrix, for one
-    /// product. Over a short interval h is smooth, and r is small.
+    /// [R; s], one matrix for one product: |R x|^2 is the integral of h^2, and s x the integral of h. R is r x n; over
+    /// a short interval h is smooth, and r is small.
     rows: DMatrix<f64>,
     /// The lengths of the columns of R.
     scales: DVector<f64>,
@@ -85,8 +86,7 @@ impl Length {
     }
 }
 
-/// A system in balanced coordinates, with its shortest interval and the intervals of twice, four times, ... its
-/// length.
+/// A system in balanced coordinates, with its shortest interval and intervals of 2, 4, 8, ... times its length.
 pub(super) struct Intervals {
     /// Columns of B in balanced coordinates: the states after an impulse.
     pub(super) starts: DMatrix<f64>,
@@ -179,16 +179,16 @@ struct Node {
     weight: f64,
 }
 
-/// The rule of three nodes, exact for the fifth degree; over 1 / 4096 of a time constant its error is below the
-/// rounding.
+/// The Gauss-Legendre rule with three nodes, exact for polynomials of degree 5; over 1 / 4096 of a time constant its
+/// error is below rounding.
 const NODES: [Node; 3] = [
     Node { part: 0.112_701_665_379_258_31, weight: 5.0 / 18.0 },
     Node { part: 0.5, weight: 8.0 / 18.0 },
     Node { part: 0.887_298_334_620_741_7, weight: 5.0 / 18.0 },
 ];
 
-/// `row` times e^(A t), t = `part` of the shortest interval; `a`: A times its length. Later terms are
-/// below the rounding.
+/// `row` times e^(A t), where t is the fraction `part` of the shortest interval, by the Taylor series up to degree 5;
+/// later terms are below rounding. `a`: A times the length of the shortest interval.
 fn row_after(row: &DMatrix<f64>, a: &DMatrix<f64>, part: f64) -> DMatrix<f64> {
     let (mut term, mut sum) = (row.clone(), row.clone());
     for degree in 1..=5 {

@@ -8,8 +8,8 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 const PER_DECADE: u32 = 60;
-/// From this order on, [`KnownResponse::scaled`] keeps the known responses; below, the result has the bits of a new
-/// system.
+/// From this order on, [`KnownResponse::scaled`] reuses the known responses; below, it computes new ones, so that the
+/// result has the bits of a new system.
 const LARGE: usize = 48;
 
 /// The frequencies of modes, where a response may have peaks: in continuous time imaginary part and modulus.
@@ -24,7 +24,8 @@ pub(crate) fn resonances(modes: &[Complex<f64>], domain: Domain) -> Vec<f64> {
 
 /// A stable system with its eigenvalues, its Hessenberg form, and its response at frequencies of a sweep.
 ///
-/// Systems that differ by a choice of channels, by the sign of C or by units share all of them.
+/// Systems that differ by a choice of channels, by the sign of C or by units share eigenvalues, Hessenberg form and
+/// responses.
 #[derive(Clone)]
 pub(crate) struct KnownResponse {
     pub(crate) system: StateSpace,

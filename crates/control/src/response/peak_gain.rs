@@ -9,7 +9,7 @@ use std::rc::Rc;
 
 /// Largest number of rounds; each round halves the intervals whose bounds differ most.
 const ROUNDS: usize = 200;
-/// A round halves only intervals whose bounds differ by more than the largest such difference divided by this.
+/// A round halves only intervals whose bounds differ by more than 1 / `GAP_RATIO` of the largest difference.
 const GAP_RATIO: f64 = 32.0;
 const MOST_INTERVALS: usize = 1 << 18;
 /// Number of outputs that share the states after an impulse.
@@ -117,7 +117,7 @@ fn by_intervals(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
 /// The states after an impulse, which all outputs share.
 struct Trajectory {
     start: Rc<DVector<f64>>,
-    /// The states; the key is their time in shortest intervals.
+    /// The states; the key is the time of the state, counted in shortest intervals.
     states: HashMap<u128, Rc<DVector<f64>>>,
 }
 
@@ -168,8 +168,8 @@ impl Piece {
     }
 }
 
-/// The lower and the upper bound of the integral of |h| over all time. They differ by at most `width` times the lower
-/// one, plus the rounding errors and the bound of the integral after the longest of `lengths`.
+/// The lower and the upper bound of the integral of |h| over all time. Their difference is at most `width` times the
+/// lower bound, plus the rounding errors and the bound of the integral after the longest of `lengths`.
 fn integral(
     lengths: &[Length],
     trajectory: &mut Trajectory,
@@ -212,7 +212,7 @@ fn integral(
     Err(error(ROUNDS))
 }
 
-/// The pieces of one length with these starts.
+/// The pieces of length `length` that begin at `starts`.
 fn from_starts(length: &Length, starts: Vec<Start>) -> Vec<Piece> {
     let states: Vec<_> = starts.iter().map(|start| &start.state).collect();
     let bounds = length.bounds(&columns(&states));

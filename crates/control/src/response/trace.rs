@@ -22,11 +22,11 @@ const LARGE: usize = 48;
 pub struct TimeResponse {
     /// Times, ascending from 0, in the unit of time of A or of the period.
     pub time: Vec<f64>,
-    /// z at these times, p x length of `time`, at 0 after the jump of the input.
+    /// z at the times `time`, with a row for each output; at time 0 after the jump of the input.
     pub output: DMatrix<f64>,
     /// The limit of z for large times, p.
     pub final_value: DVector<f64>,
-    /// z' at these times; no columns in sampled time, or if the points do not follow every oscillation.
+    /// z' at the times `time`; no columns in sampled time, or if the points do not follow every oscillation.
     pub(super) slope: DMatrix<f64>,
 }
 
@@ -140,7 +140,7 @@ struct Modes {
 struct Mode {
     /// The time at which the mode has decayed.
     end: f64,
-    /// The modulus of its eigenvalue in continuous time, in 1 / time.
+    /// The modulus of the mode's eigenvalue in continuous time, in 1 / time.
     rate: f64,
 }
 

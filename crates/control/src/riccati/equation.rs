@@ -48,8 +48,8 @@ impl RiccatiEquation {
         })
     }
 
-    /// Largest entry of the left side relative to the sum of its absolute terms, by which iterates are compared;
-    /// infinite if P has no gain, or the left side or a term is not finite.
+    /// The largest entry of the left side of the equation relative to the sum of the moduli of its terms, to compare
+    /// iterates; infinite if P has no gain, or the left side or a term is not finite.
     pub(super) fn entrywise_residual(&self, p: &DMatrix<f64>) -> f64 {
         self.relative_residual(p, &p.abs(), 0.0)
     }

@@ -12,8 +12,8 @@ use nalgebra::{Complex, DMatrix, SymmetricEigen};
 const TOLERANCE_PER_STATE: f64 = 1e-13;
 /// Eigenvalues closer than this to the stability limit, relative to the norm of A, do not count as stable.
 const NEAR: f64 = 1e-12;
-/// Largest distance from the limit, relative to the norm of A, to which rounding moves a mode of A + B K that does not
-/// appear in Q: about the root of the residual of P.
+/// Largest distance, relative to the norm of A, by which rounding moves a mode of A + B K off the stability limit if
+/// the mode does not appear in Q: about the root of the residual of P.
 const MOVED: f64 = 1e-4;
 
 /// Checks that (A, B) is stabilisable and that every mode on the stability limit appears in Q; otherwise
@@ -82,8 +82,8 @@ fn tolerance(a: &DMatrix<f64>) -> f64 {
     TOLERANCE_PER_STATE * as_number(a.nrows())
 }
 
-/// A lower bound of the singular values of [A - lambda I; Q] for every lambda, Q scaled to the size
-/// of A: the smallest eigenvalue of Q, less its rounding; NaN for Q = 0.
+/// A lower bound of the singular values of [A - lambda I; Q] for every lambda, with Q scaled to the size of A: the
+/// smallest eigenvalue of Q minus its rounding error; NaN for Q = 0.
 fn smallest_weight(a: &DMatrix<f64>, q: &DMatrix<f64>) -> f64 {
     let (size, n) = (a.norm() / q.norm(), q.nrows());
     let eigen = SymmetricEigen::try_new(q.clone(), f64::EPSILON, 100 * n);

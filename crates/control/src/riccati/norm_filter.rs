@@ -75,7 +75,8 @@ pub struct NormFilter {
     domain: Domain,
     /// The Kalman filter for `A_s`, C, Q and R.
     filter: KalmanFilter,
-    /// Whether doubling finds the covariance of the Kalman filter, so that it solves the equation of each bound.
+    /// Whether doubling finds the covariance of the Kalman filter; then doubling also solves the equation of each
+    /// bound.
     by_doubling: bool,
 }
 

@@ -18,7 +18,7 @@ const REFINED_SAMPLES: u32 = 20;
 const PARTS: u32 = 4;
 /// Instability above which a delay counts as unstable; less may be a rounding error of modes close to z = 1.
 const CLEAR: f64 = 1e-6;
-/// The same, relative to the decay of the loop without a delay.
+/// Instability above which a delay counts as unstable, relative to the decay of the loop without a delay.
 const RELATIVE: f64 = 0.1;
 
 /// Computes the delay margin: the smallest delay, common to all commands (or to all measurements),
@@ -191,8 +191,8 @@ fn stable_delay(
     }
 }
 
-/// Computes, over a sample, A and the effects of the previous and of the new command, which arrives after the fraction
-/// `part` of the sample, 0 to 1; at a sampled plant it arrives at once.
+/// Computes, over a sample, A and the effects of the previous and of the new command. The new command arrives after the
+/// fraction `part` (0 to 1) of the sample; at a sampled plant it arrives at once.
 fn hold_late(plant: &StateSpace, period: f64, part: f64) -> Result<[DMatrix<f64>; 3], Error> {
     let (n, m) = plant.b.shape();
     let none = DMatrix::zeros(n, m);
@@ -210,8 +210,8 @@ fn hold_late(plant: &StateSpace, period: f64, part: f64) -> Result<[DMatrix<f64>
     Ok([a, old, new])
 }
 
-/// The dynamics of the loop whose commands are delayed by `samples` and a fraction `part` of one, 0 to 1. States: those
-/// of plant and controller and the last `samples` + 1 commands, the newest first.
+/// The dynamics of the loop whose commands are delayed by `samples` samples and the fraction `part` (0 to 1) of a
+/// sample. States: the states of plant and controller, then the last `samples` + 1 commands, the newest first.
 fn delayed(
     plant: &StateSpace,
     controller: &StateSpace,

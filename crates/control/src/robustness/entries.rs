@@ -152,7 +152,7 @@ impl Loop {
     }
 }
 
-/// The gradients with respect to A and B from those with respect to the sampled plant.
+/// Converts gradients with respect to the sampled plant to gradients with respect to A and B of the continuous plant.
 fn through_hold(
     plant: &StateSpace,
     period: f64,

@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 const REACH: f64 = 16.0;
 const FACTOR: f64 = 1.1;
 const FIRST: f64 = 1e-6;
-/// Below this multiple the tests are a factor of two apart.
+/// Successive tested multiples differ by a factor of 2 below this multiple, and by [`FACTOR`] above.
 const SMALL: f64 = 0.05;
 
 /// The plants that a controller may control: each parameter deviates by -1 to 1 of its tolerance.
@@ -21,16 +21,16 @@ pub trait PlantFamily {
     /// The number of parameters.
     fn count(&self) -> usize;
 
-    /// The plant whose parameters deviate by these parts of their tolerances, in continuous time or sampled at
-    /// the sample time of the controller.
+    /// The plant whose parameters deviate by the fractions `deviations` of their tolerances, in continuous time or
+    /// sampled at the sample time of the controller.
     ///
     /// # Errors
     ///
     /// The plant cannot be computed.
     fn plant(&self, deviations: &[f64]) -> Result<StateSpace, Self::Error>;
 
-    /// The derivatives of a quantity with respect to each deviation, from those with respect to the entries
-    /// of A, B, C and D. They guide the search only.
+    /// The derivatives of a quantity with respect to each deviation, from `entries`, its derivatives with respect to
+    /// the entries of A, B, C and D. They only guide the search.
     fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64>;
 
     /// The ascending multiples of the tolerances for tests of the worst direction; by default from 1e-6 to at most 16.
@@ -68,7 +68,7 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
         Ok(Loop::new(plant, self.controller.clone())?.dynamics())
     }
 
-    /// [`instability`] of the loop with these deviations; infinite if the samples of the plant overflow.
+    /// [`instability`] of the loop with the plant of `deviations`; infinite if the samples of the plant overflow.
     pub(super) fn instability(&self, deviations: &[f64]) -> Result<f64, F::Error> {
         let plant = self.family.plant(deviations)?;
         match self.dynamics(plant) {
@@ -80,7 +80,7 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
         }
     }
 
-    /// The multiple of the deviations below which the loop is stable; None if it is stable at all
+    /// The multiple of the deviations below which the loop is stable; None if the loop is stable at all
     /// [`PlantFamily::multiples`].
     pub(super) fn first_unstable(&self, deviations: &[f64]) -> Result<Option<f64>, F::Error> {
         stability_limit(0.0, self.family.multiples(), |multiple| {

@@ -90,8 +90,8 @@ pub fn longest_period(plant: &StateSpace, controller: &StateSpace) -> Result<f64
     search(value, [period, period, 1000.0 * period])
 }
 
-/// The first time between `from` and `to` at which the value is no longer negative; zero if it is not negative at
-/// `from`, infinite if it is negative at all tested times. Below `short` fewer times are tested.
+/// The first time between `from` and `to` at which the value is at least zero: zero if it is so at `from`, infinite if
+/// the value is negative at all tested times. Below `short` fewer times are tested.
 fn search(
     value: impl Fn(f64) -> Result<f64, Error>,
     [from, short, to]: [f64; 3],

@@ -11,7 +11,7 @@ const BALANCINGS: usize = 30;
 const EIGEN_ITERATIONS: usize = 1000;
 /// Half of the range of ln(d), about the balanced start, in which the best scaling is searched.
 const RANGE: f64 = 12.0;
-/// The balancing does not reduce effects on other channels below this part of the largest diagonal entry.
+/// The balancing does not reduce effects on other channels below this fraction of the largest diagonal entry.
 const NEGLIGIBLE: f64 = 1e-3;
 
 /// The largest value over frequency of a structured singular value.

@@ -16,7 +16,7 @@ pub(super) struct Sweep<'a> {
     pub(super) response: &'a KnownResponse,
     /// Ascending, in rad per unit of time.
     pub(super) frequencies: Vec<f64>,
-    /// The response at each of these frequencies.
+    /// The response at each of `frequencies`.
     pub(super) values: Vec<DMatrix<Complex<f64>>>,
 }
 

@@ -24,7 +24,7 @@ pub struct PlantEntry {
 pub struct Tolerances {
     /// The tolerances of A, B, C and D: four matrices of the shapes of the plant's; zero for an exact entry.
     pub of: [DMatrix<f64>; 4],
-    /// Entries that change by the same factor. An entry in none of these groups changes independently.
+    /// Groups of entries that change by a common factor. An entry in no group changes independently.
     pub common: Vec<Vec<PlantEntry>>,
 }
 
@@ -71,8 +71,8 @@ impl Tolerances {
     }
 }
 
-/// Whether the equation of `row` equates its left side to one state, which is not `excluded`: the row of `states` (A or
-/// C) has a single 1 and zeros, the row of `commands` (B or D) only zeros.
+/// Whether the equation of row `row` equates its left side to a single state other than `excluded`: the row of `states`
+/// (A or C) has a single 1 and zeros, the row of `commands` (B or D) only zeros.
 fn is_signal(
     states: &DMatrix<f64>,
     commands: &DMatrix<f64>,
@@ -104,8 +104,8 @@ pub struct ToleranceTest {
     pub worst: StateSpace,
     /// The deviations of the worst plant, as parts of the tolerances.
     pub deviations: Vec<f64>,
-    /// The multiple of the tolerances, in the direction of the worst plant, below which the loop is
-    /// stable; None if it is stable at all [`PlantFamily::multiples`].
+    /// The multiple of the tolerances, in the direction of the worst plant, below which the loop is stable; None if the
+    /// loop is stable at all [`PlantFamily::multiples`].
     pub first_unstable: Option<f64>,
 }
 
@@ -213,8 +213,8 @@ struct Entry {
     size: f64,
 }
 
-/// All plants within the tolerances of single entries: each is multiplied by 1 + t d, t its tolerance,
-/// d its deviation. Entries that change together have one deviation.
+/// All plants within the tolerances of single entries: each entry is multiplied by 1 + t d with its tolerance t and its
+/// deviation d. Entries that change together have one deviation.
 pub struct EntryFamily<'a> {
     pub(super) plant: &'a StateSpace,
     deviations: Vec<Vec<Entry>>,

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 /// Steps of the golden-section search; the interval shrinks to 1e-4 of its length.
 const GOLDEN_SECTION_STEPS: usize = 20;
 
-/// An invariant ellipsoid in which the error ends.
+/// An invariant ellipsoid to which the error converges.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct UltimateBound {

@@ -8,7 +8,7 @@ use crate::svd::Svd;
 use crate::{Domain, Error, check};
 use nalgebra::{Complex, DMatrix};
 
-/// The imaginary part of a real eigenvalue that is double is at most this part of it, by rounding.
+/// Rounding gives a double real eigenvalue an imaginary part of at most this fraction of its modulus.
 const DOUBLE: f64 = 1e-8;
 
 /// The feedforward `N_r` beside integral action, and the eigenvalues that references do not excite.
@@ -117,7 +117,7 @@ fn of_controllable(
     Ok(Ok(IntegralFeedforward { gain, silent }))
 }
 
-/// The `count` slowest eigenvalues; None if half of a complex pair is the last of them, or there are fewer.
+/// The `count` slowest eigenvalues; None if they would split a complex pair, or if there are fewer.
 fn slowest(values: &[Complex<f64>], count: usize, domain: Domain) -> Option<Vec<Complex<f64>>> {
     let exact = |value: &Complex<f64>| {
         let is_real = value.im.abs() <= DOUBLE * value.norm();

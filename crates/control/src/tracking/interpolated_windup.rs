@@ -6,7 +6,7 @@ use crate::svd::{Svd, norm_2};
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
-/// The largest number of commands with limits; every set of them is examined.
+/// The largest number of commands with limits, because every set of these commands is examined.
 const COMMANDS: usize = 10;
 /// Bisections of an interval.
 const BISECTIONS: usize = 12;
@@ -21,9 +21,9 @@ const MARGIN: f64 = 1e-10;
 /// The result of [`interpolated_windup`]: whether an interpolated back-calculation is stable.
 #[derive(Debug, Clone, PartialEq)]
 pub enum InterpolatedWindup {
-    /// It is stable for every constant value between the points and every set of commands at their limits.
+    /// Stable for every constant value between the points and every set of commands at their limits.
     Stable,
-    /// It is unstable at one value for one set of commands.
+    /// Unstable at one value for one set of commands at their limits.
     Unstable {
         /// s, from 0 at the first point to 1 at the second.
         part: f64,
@@ -33,7 +33,7 @@ pub enum InterpolatedWindup {
         /// real part.
         instability: f64,
     },
-    /// Neither was shown for these commands at their limits.
+    /// Neither stability nor instability was shown for one set of commands at their limits.
     Undecided {
         /// The indices, from 0, of the commands at their limits.
         limited: Vec<usize>,

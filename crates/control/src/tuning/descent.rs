@@ -17,11 +17,11 @@ const DIFFERENCE: f64 = 1e-3;
 /// The largest number of step lengths that are tried, and the part of the predicted decrease that a step must reach.
 const HALVINGS: usize = 14;
 const SUFFICIENT: f64 = 1e-2;
-/// A search ends at the second step that decreases gamma by less than this part.
+/// A search ends at the second step that decreases gamma by less than this fraction.
 const FLAT: f64 = 1e-5;
-/// A round that decreases gamma by less than this part is the last one if the peak is on the grid, see `BETWEEN`.
+/// A round that decreases gamma by less than this fraction is the last one if the peak is on the grid, see `BETWEEN`.
 const PROGRESS: f64 = 1e-3;
-/// A norm that exceeds the largest value of the grid by at most this part counts as on the grid.
+/// A norm that exceeds the largest value of the grid by at most this fraction counts as on the grid.
 const BETWEEN: f64 = 2e-3;
 
 impl Tuning<'_> {
@@ -70,7 +70,7 @@ struct Search<'a> {
     at: DVector<f64>,
 }
 
-/// A controller and its values on the grid, term by term.
+/// A controller, and the weighted singular values of its loop on the grid, term by term.
 struct Iterate {
     controller: StateSpace,
     values: Vec<Vec<f64>>,
@@ -135,7 +135,8 @@ impl Search<'_> {
         iterate.largest()
     }
 
-    /// The controller and its values at `parameters`; None if these are not allowed, or the loop is not stable enough.
+    /// The controller and its values at `parameters`; None if the parameters are not allowed, or the loop is not stable
+    /// enough.
     fn iterate(&self, parameters: &DVector<f64>) -> Option<Iterate> {
         if !(self.grid.tuning.is_allowed)(parameters) {
             return None;

@@ -11,7 +11,7 @@ use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::PI;
 
-/// Frequencies of the grid in a decade, and its decades on both sides of the bandwidth.
+/// Number of frequencies per decade of the grid, which spans [`DECADES`] decades on each side of the bandwidth.
 const PER_DECADE: i32 = 30;
 const DECADES: i32 = 3;
 

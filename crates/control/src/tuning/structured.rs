@@ -11,10 +11,10 @@ use nalgebra::DMatrix;
 /// The largest number of steps of the search, and of successive steps without success.
 const STEPS: usize = 4000;
 const IDLE: usize = 400;
-/// Factors of the length of a step after a success and after a failure; with one success in five steps it is constant.
+/// Factor of the step length after a success; with [`SHORTER`] after each failure, one success in five steps keeps it.
 const LONGER: f64 = 1.5;
 const SHORTER: f64 = 0.903_602;
-/// Singular values of the signals' correlation below this part of the largest count as rounding errors.
+/// Singular values of the signals' correlation below this fraction of the largest count as rounding errors.
 const ROUNDING: f64 = 1e-10;
 /// Multiples of the start that are tried first: a stable plant stays stable with small gains of the right signs.
 const SCALES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];

@@ -14,7 +14,7 @@ const SLOWEST: f64 = 1e-3;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct CertifiedLoss {
-    /// The factor of the box; zero if no factor above 1 % of the largest tried one is proven.
+    /// The factor by which the box is scaled; zero if no factor above 1 % of the largest tried factor is proven.
     pub factor: f64,
     /// The proof, if the factor is above zero.
     pub certificate: Option<RegionCertificate>,

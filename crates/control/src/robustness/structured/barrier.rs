@@ -23,7 +23,7 @@ pub(super) struct Barrier<'a> {
     largest_g: f64,
 }
 
-/// D, G and their coefficients.
+/// The scales D and G, and their coefficients of [`directions`].
 #[derive(Clone)]
 pub(super) struct Point {
     coefficients: DVector<f64>,
@@ -42,7 +42,7 @@ struct Inequality {
 }
 
 impl<'a> Barrier<'a> {
-    /// `size`: an upper bound of the norm of M, to which the largest G is relative.
+    /// `size`: an upper bound of the norm of M, which limits G.
     pub(super) fn new(m: &'a ComplexMatrix, blocks: &[Block], size: f64) -> Self {
         Self { m, directions: directions(blocks), largest_g: LARGEST_G * size }
     }

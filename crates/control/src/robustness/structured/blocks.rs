@@ -8,7 +8,7 @@ use nalgebra::{Complex, DMatrix};
 pub enum Block {
     /// delta I with one real number delta, on this many channels.
     Real(usize),
-    /// Any complex matrix, on this many channels; its size is the 2-norm.
+    /// A full complex matrix on this many channels; its size is the 2-norm.
     Full(usize),
 }
 
@@ -36,7 +36,7 @@ pub(super) type SparseEntry = (usize, usize, Complex<f64>);
 /// A direction in which the scales D and G change.
 pub(super) struct Direction {
     pub(super) block: usize,
-    /// Whether it changes G; otherwise D.
+    /// Whether the direction changes G instead of D.
     pub(super) of_g: bool,
     /// The entries of a Hermitian matrix.
     pub(super) entries: Vec<SparseEntry>,

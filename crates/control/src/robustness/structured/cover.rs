@@ -10,7 +10,7 @@ use crate::{Error, StateSpace};
 
 /// Frequencies for each decade at which scales are searched first.
 const PER_DECADE: u32 = 6;
-/// The relative increase of the bound where no scales for it exist, or scales hold on a short interval only.
+/// The relative increase of the bound at frequencies where no scales prove it, or only on a short interval.
 const RAISE: f64 = 5e-3;
 /// Relative width of an interval below which the bound is raised.
 const SHORT: f64 = 1e-3;
@@ -18,7 +18,7 @@ const SHORT: f64 = 1e-3;
 const NEAR_ZERO: f64 = 1e-4;
 const ROUNDS: usize = 3000;
 
-/// The bound so far and the frequencies that it does not cover yet.
+/// The bound so far, and the intervals of frequency in which it is not proven yet.
 pub(super) struct Cover<'a> {
     response: Response,
     blocks: &'a [Block],
@@ -99,7 +99,7 @@ impl<'a> Cover<'a> {
         })
     }
 
-    /// Removes an interval about `frequency` from the gaps, with a raised bound if necessary.
+    /// Proves the bound, raised if necessary, on an interval about `frequency`, which is removed from the gaps.
     fn cover(&mut self, frequency: f64) -> Result<(), Error> {
         let m = self.response.at(frequency)?;
         let shortest = SHORT * frequency.min(f64::MAX).max(SHORT * SHORT * self.fastest);

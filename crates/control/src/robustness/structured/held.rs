@@ -11,7 +11,7 @@ use crate::svd::norm_2;
 use crate::{Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
-/// Error of the Gauss method, relative to the effect of the tolerances, below which it has enough stages.
+/// The Gauss method has enough stages when its error, relative to the effect of the tolerances, is below this.
 const PRECISE: f64 = 1e-2;
 const MOST_STAGES: usize = 3;
 /// The least fraction of the tolerances for which the error is bounded.
@@ -86,8 +86,8 @@ impl<'a> HeldFamily<'a> {
         })
     }
 
-    /// M for deviations up to the fraction `assumed` of the tolerances, or up to a smaller one for which the error of
-    /// the Gauss method has a bound; None if there is no such fraction.
+    /// M for deviations up to the fraction `assumed` of the tolerances, or up to a smaller fraction for which the error
+    /// of the Gauss method has a bound; None if there is no such fraction.
     pub(super) fn system(&self, assumed: f64) -> Result<Option<HeldLoop>, Error> {
         let Some(error) = self.error(assumed) else { return Ok(None) };
         let (n, inner) = (self.states, self.z.nrows());

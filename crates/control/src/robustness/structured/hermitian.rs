@@ -8,7 +8,8 @@ use nalgebra::{Complex, SymmetricEigen};
 const POSITIVE: f64 = 1e-13;
 const EIGEN_ITERATIONS: usize = 1000;
 
-/// L of H = L L*; None unless every pivot is above the rounding errors of a diagonal of the size `scale`.
+/// The Cholesky factor L of H = L L*; None unless every pivot is above the rounding errors of a diagonal of the size
+/// `scale`.
 ///
 /// The Cholesky decomposition of nalgebra does not fail: it takes complex roots of negative pivots.
 pub(super) fn factor(h: &ComplexMatrix, scale: &[f64]) -> Option<ComplexMatrix> {

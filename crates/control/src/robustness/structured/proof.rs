@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 
 /// The largest number of channels of the perturbation, and of states of the loop.
 const LARGEST: usize = 100;
-/// The search ends if the proven fraction reaches this part of the fraction for which the Gauss error was bounded.
+/// The search ends if the proven fraction reaches this multiple of the fraction for which the Gauss error was bounded.
 const NEAR: f64 = 0.97;
 /// Otherwise the Gauss error is bounded again for the proven fraction times this.
 const FURTHER: f64 = 1.02;
@@ -94,7 +94,8 @@ pub fn proven_tolerance(
     }
 }
 
-/// Converts a change of [A, B; C, D] of a sampled plant to the change of these matrices of `held`, its [`held_plant`].
+/// Converts a change of [A, B; C, D] of a sampled plant to the change of [A, B; C, D] of `held`, the [`held_plant`] of
+/// the sampled plant.
 fn held_change(change: &DMatrix<f64>, held: &StateSpace) -> DMatrix<f64> {
     let (n, (p, m)) = (held.a.nrows(), held.d.shape());
     let states = change.nrows() - p;

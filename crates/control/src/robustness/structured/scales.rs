@@ -10,7 +10,7 @@ use crate::blocks::ComplexMatrix;
 /// Part of the distance from the least bound of the current scales that a step leaves, so that the scales stay inside.
 const DISTANCE: f64 = 0.1;
 const STEPS: usize = 60;
-/// Relative progress of a step below which the bound counts as the least one.
+/// The search ends after a step that reduces the bound by less than this fraction.
 const STALLED: f64 = 5e-4;
 
 /// Hermitian matrices D > 0 and G that commute with the structure.
@@ -18,7 +18,7 @@ const STALLED: f64 = 5e-4;
 pub(super) struct Scales {
     pub(super) d: ComplexMatrix,
     pub(super) g: ComplexMatrix,
-    /// The bound for which they hold.
+    /// The bound that D and G prove.
     pub(super) bound: f64,
 }
 
@@ -68,7 +68,7 @@ impl Scales {
     }
 }
 
-/// The least bound for which the scales of a point hold.
+/// The least bound that the scales of a point prove.
 fn least_bound(m: &ComplexMatrix, at: &Point) -> Result<f64, Error> {
     let Point { d, g, .. } = at;
     let size: Vec<f64> = d.diagonal().iter().map(|x| x.re).collect();
