@@ -30,7 +30,7 @@ thread_local! {
     static COUNT: Cell<Arithmetic> = const { Cell::new(Arithmetic::NONE) };
 }
 
-/// A number that counts the operations with it. It is finite, and neither below nor above another one.
+/// A number that counts the operations on it. Every number is finite, and no number is below or above another.
 #[derive(Clone, Copy)]
 struct Counted;
 
@@ -114,8 +114,8 @@ impl Arithmetic {
         all
     }
 
-    /// Adds the operations of a schedule outside of the equations: the place in the grid, the operating point there,
-    /// the limits as deviations from it.
+    /// Adds the operations of a schedule outside of the equations: the search of the grid interval, the operating
+    /// point, and the limits as deviations from the operating point.
     fn add_place(&mut self, controller: &Controller) {
         let Some(schedule) = &controller.schedule else { return };
         let operating = operating_vectors(controller).into_iter();
@@ -131,8 +131,7 @@ impl Arithmetic {
     }
 }
 
-/// Counts the checks of measurements, references and a scheduling variable: whether they are finite, and in their
-/// range.
+/// Counts the checks of measurements, references and a scheduling variable: whether each is finite and in its range.
 fn take_inputs(controller: &Controller) {
     let measured = vec![Counted; Kind::Measurement.count(controller)];
     if controller.checks_measurements() {

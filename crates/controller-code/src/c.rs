@@ -21,7 +21,7 @@ use super::{Precision, Request};
 
 /// The largest number of characters in a line of a table.
 const WIDTH: usize = 100;
-/// The file of C code that is the same for each design.
+/// The file of C code that all designs share.
 const RUNTIME: &str = "aso_controller.h";
 /// The text of [`RUNTIME`], whose functions compute a sample.
 const RUNTIME_TEXT: &str = include_str!("../runtime/aso_controller.h");

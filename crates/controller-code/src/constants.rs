@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::symbols::Kind;
 
-/// A table of constants: a vector, or matrices below each other.
+/// A table of constants: a vector, or stacked matrices.
 pub(super) struct Constants {
-    /// The name, which C writes as it is and Rust in capitals.
+    /// The name, in C unchanged and in Rust in capitals.
     pub(super) name: &'static str,
     /// The comment before the table in C; empty for a table that needs none.
     pub(super) meaning: &'static str,
@@ -26,7 +26,7 @@ impl Constants {
         self.values.iter().map(Vec::len).sum()
     }
 
-    /// Matrices below each other, one for each of the `layers`; one matrix without them.
+    /// A table of stacked matrices, one for each of the `layers`; a single matrix without layers.
     pub(super) fn matrices<'a>(
         name: &'static str,
         meaning: &'static str,

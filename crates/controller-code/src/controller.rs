@@ -21,7 +21,7 @@ pub(super) struct Controller {
     /// Start of the compensation in s, and the first sample at or after it.
     pub(super) t_on: f64,
     pub(super) first_compensated: u32,
-    /// Whether the fault is estimated while it is not compensated.
+    /// Whether faults are also estimated while they are not compensated.
     pub(super) monitor: bool,
     /// The diagonal of W, the weights of the filter of the measurements.
     pub(super) filter: Option<Vec<f64>>,
@@ -52,12 +52,13 @@ pub(super) struct Controller {
     pub(super) states: Vec<Signal>,
     pub(super) actuators: Vec<Signal>,
     pub(super) measurements: Vec<Signal>,
-    /// For each measurement the most samples for which its last value may replace it; none without such a limit.
+    /// For each measurement, the largest number of samples for which its last value may replace it; `None` without a
+    /// limit.
     pub(super) most_held: Vec<Option<u32>>,
     pub(super) faults: Vec<Signal>,
     pub(super) references: Vec<Signal>,
     pub(super) losses: Vec<Loss>,
-    /// Matrices and operating points that depend on a variable, in place of those above.
+    /// Matrices and operating points that depend on a scheduling variable, in place of the constant ones.
     pub(super) schedule: Option<Schedule>,
     pub(super) detection: Option<Detection>,
     pub(super) reconfiguration: Option<Reconfiguration>,
@@ -166,12 +167,12 @@ impl Controller {
         signals.iter().map(|signal| signal.operating).collect()
     }
 
-    /// The scheduling variable if it is an input of its own, else an empty list.
+    /// The scheduling variable if it is a separate input; otherwise an empty list.
     pub(super) fn schedule_inputs(&self) -> &[Signal] {
         self.schedule.as_ref().and_then(Schedule::input).map_or(&[], std::slice::from_ref)
     }
 
-    /// A matrix at each point of the schedule; `None` if it does not depend on the scheduling variable.
+    /// A matrix at each point of the schedule; `None` if the matrix does not depend on the scheduling variable.
     pub(super) fn scheduled(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
         self.schedule.as_ref().and_then(|schedule| schedule.matrices(matrix))
     }
@@ -181,13 +182,13 @@ impl Controller {
         self.first_compensated > 0 || self.counts_all()
     }
 
-    /// Whether an instance counts all of its samples: the times of a detection and of a reconfiguration follow from
-    /// their number.
+    /// Whether an instance counts all of its samples, because the times of a detection and of a reconfiguration follow
+    /// from the count.
     pub(super) fn counts_all(&self) -> bool {
         self.detection.is_some() || self.reconfiguration.is_some()
     }
 
-    /// A matrix in each set of gains; `None` if it is the same in all.
+    /// A matrix in each set of gains; `None` if all sets have the same matrix.
     pub(super) fn chosen(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
         self.reconfiguration.as_ref().and_then(|reconfiguration| reconfiguration.matrices(matrix))
     }

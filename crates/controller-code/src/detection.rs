@@ -115,8 +115,8 @@ impl Detection {
             + if self.method == Method::Cusum { 2 * self.tests.len() } else { self.c.nrows() }
     }
 
-    /// The number of 32-bit integers in an instance besides the counter of samples: the starts of both sums, or the
-    /// start of a window and the samples in it, for each test; alarm, onset and isolated fault.
+    /// The number of 32-bit integers in an instance besides the counter of samples. For each test: the starts of both
+    /// sums, or the start of a window and its number of samples. Then alarm, onset and isolated fault.
     pub(super) fn counters(&self) -> usize {
         2 * self.tests.len() + 3
     }

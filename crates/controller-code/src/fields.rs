@@ -11,9 +11,9 @@ pub(super) struct Fields {
     pub(super) actuators: Vec<String>,
     pub(super) measurements: Vec<String>,
     pub(super) references: Vec<String>,
-    /// The scheduling variable, if it is an input of its own.
+    /// The scheduling variable, if it is a separate input.
     pub(super) schedule: Vec<String>,
-    /// The integrals, named like their references.
+    /// The integrals; each has the name of its reference.
     pub(super) integrals: Vec<String>,
 }
 

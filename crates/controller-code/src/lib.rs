@@ -67,7 +67,7 @@ impl Precision {
         }
     }
 
-    /// The nearest number of this precision as text of both languages, without suffix.
+    /// The nearest number of this precision as text, which is the same in C and Rust, without suffix.
     fn literal(self, value: f64) -> String {
         match self {
             Self::Double => format!("{value:?}"),
@@ -94,7 +94,8 @@ pub struct Request<'a> {
     pub identity: &'a str,
     /// The verdict on the design: one word.
     pub verdict: &'static str,
-    /// The delay of all commands at which the loop becomes unstable, in s, if it is known; infinite if none does.
+    /// The common delay of all commands, in s, at which the loop becomes unstable; infinite if no delay destabilises
+    /// the loop, `None` if the delay is not known.
     pub delay_margin: Option<f64>,
     /// The language.
     pub language: Language,

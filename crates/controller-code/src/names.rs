@@ -24,7 +24,7 @@ stdio stdlib stdnoreturn std string test tgmath threads time uchar wchar wctype"
 /// The most characters of the name of a controller: with `_init_at` it has the 31 characters that C99 guarantees for an
 /// external name.
 const LONGEST_PREFIX: usize = 23;
-/// The most characters of the name of a signal, before a number makes it different from others; C99 guarantees 63 for a
+/// The most characters of the name of a signal, before a number is appended to make it unique; C99 guarantees 63 for a
 /// field.
 const LONGEST_FIELD: usize = 40;
 

@@ -19,7 +19,7 @@ pub(super) struct Numbers<N> {
     bounds: [Vec<N>; 2],
     /// The operating point: states, commands, measurements, references.
     point: [Vec<N>; 4],
-    /// A zero for each limit of the commands; only their number counts. Empty without limits.
+    /// A zero for each limit of the commands, because only the number of limits matters; empty without limits.
     limits: Vec<N>,
     /// The weights of two points of a schedule; none without one.
     weights: Option<[N; 2]>,
@@ -72,7 +72,7 @@ impl<N: Number> Numbers<N> {
         }
     }
 
-    /// A matrix; [`sample::Matrix::NONE`] if the controller does not state it.
+    /// A matrix; [`sample::Matrix::NONE`] if the controller does not state the matrix.
     pub(super) fn matrix(&self, matrix: Matrix) -> sample::Matrix<'_, N> {
         let entries = self.matrices.iter().find(|entries| entries.matrix == matrix);
         let Some(Entries { values, is_scheduled, .. }) = entries else {
@@ -173,7 +173,7 @@ impl<N: Number> Vectors<N> {
         Self(SIGNALS.map(|vector| vec![N::zero(); vector.length(controller)]))
     }
 
-    /// The elements of `vector`; empty if it is none of `sample::Signals`, or if the design does not have it.
+    /// The elements of `vector`; empty if the vector is not part of `sample::Signals` or not part of the design.
     pub(super) fn get_mut(&mut self, vector: Vector) -> &mut [N] {
         let place = SIGNALS.iter().position(|signal| *signal == vector);
         place.and_then(|place| self.0.get_mut(place)).map_or(&mut [], |values| values)
@@ -207,7 +207,7 @@ impl<N: Number> Memory<N> {
 }
 
 impl Vector {
-    /// The number of elements of the vector; 0 if the design does not have it.
+    /// The number of elements of the vector; 0 if the design does not have the vector.
     pub(super) fn length(self, controller: &Controller) -> usize {
         let is_stated = match self {
             Self::YF | Self::NextYF | Self::StoredYF => controller.filter.is_some(),
@@ -226,7 +226,7 @@ impl Vector {
 }
 
 impl Matrix {
-    /// The matrix, if the controller states it; no `A_f` if faults are constant.
+    /// The matrix; `None` if the controller does not state it, and for `A_f` if faults are constant.
     fn stated(self, controller: &Controller) -> Option<&nalgebra::DMatrix<f64>> {
         self.of(controller).filter(|_| self != Self::AF || !controller.constant_faults)
     }

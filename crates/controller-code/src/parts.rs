@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::Error;
 
-/// A state, an actuator, a measurement, a reference or a fault, as the code describes it.
+/// A state, an actuator, a measurement, a reference or a fault, for comments of the code.
 pub(super) struct Signal {
     pub(super) name: String,
     pub(super) unit: Option<String>,

@@ -9,7 +9,7 @@ use super::parts::{Signal, dense};
 use super::symbols::{Kind, Matrix};
 use crate::Error;
 
-/// The gains of a controller without some actuators, and when these count as gone.
+/// The gains of a controller for failed actuators, and the conditions on which an actuator counts as gone.
 pub(super) struct Reconfiguration {
     /// The actuators that may be gone.
     pub(super) cases: Vec<Case>,
@@ -23,7 +23,7 @@ pub(super) struct Reconfiguration {
 pub(super) struct Case {
     /// The position of the actuator.
     pub(super) actuator: usize,
-    /// The command at which it is stuck.
+    /// The command at which the failed actuator is stuck.
     pub(super) stuck_at: f64,
     /// For each state of the fault model whether its estimate restarts at 0 when the actuator fails or comes back.
     pub(super) restarts: Vec<bool>,
@@ -42,9 +42,9 @@ pub(super) struct Decision {
     pub(super) samples: u32,
 }
 
-/// Gains in force while exactly these actuators are gone, or gains of the fall-back.
+/// Gains for one set of actuators that are gone, or gains of the fall-back.
 pub(super) struct GainSet {
-    /// For each actuator whether it is gone; none is in the set of the fall-back.
+    /// For each actuator whether it is gone; all false in the set of the fall-back.
     pub(super) gone: Vec<bool>,
     k_x: DMatrix<f64>,
     k_f: DMatrix<f64>,
@@ -109,7 +109,7 @@ impl Reconfiguration {
         Ok(Some(Self { cases, sets, fallback }))
     }
 
-    /// A matrix in each of the sets; `None` if it is the same in all of them.
+    /// A matrix in each set of gains; `None` if all sets have the same matrix.
     pub(super) fn matrices(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
         match matrix {
             Matrix::KX => Some(self.sets.iter().map(|set| &set.k_x).collect()),
@@ -118,12 +118,13 @@ impl Reconfiguration {
         }
     }
 
-    /// The number of sets without the fall-back: the one of the intact plant, then those without certain actuators.
+    /// The number of sets of gains without the fall-back: the set of the intact plant, then the sets without certain
+    /// actuators.
     pub(super) fn regular_sets(&self) -> usize {
         self.sets.len() - usize::from(self.fallback.is_some())
     }
 
-    /// For each actuator the position of the set without it alone; 0 if there is none.
+    /// For each actuator, the position of the set of gains without this actuator alone; 0 if there is no such set.
     pub(super) fn single_sets(&self, actuators: usize) -> Vec<usize> {
         let single = |j: usize| {
             let is_single =
@@ -156,7 +157,8 @@ impl Reconfiguration {
         matrices.flat_map(|matrix| matrix.iter().copied()).chain(of_cases.flatten())
     }
 
-    /// The tables of real numbers: the gains from stuck actuators, their commands, the fractions of losses.
+    /// The tables of real numbers: the gains from stuck actuators, the commands at which these are stuck, and the
+    /// fractions of losses.
     pub(super) fn tables(&self, actuators: &[Signal]) -> Vec<Constants> {
         let k_s = self.sets.iter().map(|set| &set.k_s);
         let meaning = "gains from the commands of stuck actuators";
@@ -182,8 +184,8 @@ impl Reconfiguration {
     }
 }
 
-/// The decision about an actuator by its estimated loss; `None` if the case states no limit, or if no fault is its
-/// loss. An error if the time is beyond 2^32 samples.
+/// The decision about an actuator by its estimated loss; `None` if the case states no limit, or if no fault describes
+/// the loss. An error if the time is beyond 2^32 samples.
 fn decision(
     case: &design::Reconfiguration,
     losses: &[Loss],

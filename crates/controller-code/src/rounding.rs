@@ -64,7 +64,7 @@ const UNPROVEN: &str = "at worst, the errors of all signals are larger than the 
 pub(super) struct RoundingBound {
     /// Outputs (commands, faults, residuals) x signals (as [`Kind::ALL`], then 1).
     bound: Result<DMatrix<f64>, String>,
-    /// 1 - |lambda| of the slowest eigenvalue of the loop; NaN if it is not known.
+    /// 1 - |lambda| for the slowest eigenvalue lambda of the loop; NaN if this eigenvalue is not known.
     slowest: f64,
     /// Whether the bound proves that the loop with the controller in single precision is stable.
     contracts: bool,

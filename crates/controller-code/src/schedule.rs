@@ -20,7 +20,7 @@ use crate::Error;
 pub(super) struct Schedule {
     /// The scheduling variable; its start value is the first point.
     pub(super) variable: Signal,
-    /// The position of the measurement that is the scheduling variable; `None` for an input of its own.
+    /// The position of the measurement that is the scheduling variable; `None` if the variable is a separate input.
     pub(super) measurement: Option<usize>,
     /// The points of the grid, at least two, in ascending order.
     pub(super) points: Vec<Point>,
@@ -47,7 +47,7 @@ impl Schedule {
         Self { variable, measurement, points }
     }
 
-    /// The scheduling variable, if it is an input of its own.
+    /// The scheduling variable, if it is a separate input.
     pub(super) fn input(&self) -> Option<&Signal> {
         Some(&self.variable).filter(|_| self.measurement.is_none())
     }
@@ -58,7 +58,7 @@ impl Schedule {
         [at(self.points.first()), at(self.points.last())]
     }
 
-    /// A matrix at each point; `None` if it does not depend on the scheduling variable.
+    /// A matrix at each point; `None` if the matrix does not depend on the scheduling variable.
     pub(super) fn matrices(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
         let at = |point: &'_ Point| point.matrices.iter().position(|(name, _)| *name == matrix);
         self.points.iter().map(|point| Some(&point.matrices[at(point)?].1)).collect()

@@ -11,7 +11,7 @@ use super::text::{aligned, ascii, filled, one_line};
 use super::{Precision, Request};
 use aso_controller::design::{Estimator, Loss, SlidingMode};
 
-/// The functions and flags of a language, as its users write them.
+/// The functions and flags of a language, in the notation of the language.
 pub(super) struct Vocabulary {
     pub(super) init: String,
     pub(super) init_at: String,

@@ -99,8 +99,8 @@ pub(super) fn tables(controller: &Controller) -> Vec<Constants> {
     all
 }
 
-/// The names of the tables with the start values of states, actuators, measurements and references. Without a schedule
-/// these are the tables of the operating point.
+/// The names of the tables with the start values of states, actuators, measurements and references. Without a schedule,
+/// the tables of the operating point hold the start values.
 pub(super) fn starts(controller: &Controller) -> [(&'static str, Kind); 4] {
     let names = match controller.schedule {
         None => ["x_op", "u_op", "y_op", "r_op"],

@@ -6,7 +6,8 @@ use super::controller::Controller;
 use super::symbols::{Kind, Matrix};
 
 impl Matrix {
-    /// The matrix of a controller, if it has one; `A_f` is the identity if faults are constant.
+    /// The matrix of a controller; `None` if the controller does not have it. `A_f` is the identity if faults are
+    /// constant.
     pub(super) fn of(self, controller: &Controller) -> Option<&DMatrix<f64>> {
         let detection = controller.detection.as_ref();
         match self {
@@ -37,7 +38,7 @@ impl Matrix {
 }
 
 impl Kind {
-    /// The number of signals or other parts of this kind in a controller; 0 without them.
+    /// The number of signals or other parts of this kind in a controller; 0 if there are none.
     pub(super) fn count(self, controller: &Controller) -> usize {
         let (detection, reconfiguration) = (&controller.detection, &controller.reconfiguration);
         match self {

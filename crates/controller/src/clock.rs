@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The fraction of the period by which an instant may be early, in addition to [`clock_rounding`]: the sum of a million
-/// steps that an importer adds up is wrong by 1e-5 of a step.
+/// The fraction of the period by which an instant may be early, in addition to [`clock_rounding`]: after a million
+/// steps that an importer adds up, the error of the sum is 1e-5 of a step.
 const TOLERANCE: f64 = 1e-4;
 
 /// Returns the distance in s from `time` that counts as a rounding error of an importer, which adds up its steps.

@@ -49,15 +49,15 @@ pub struct Design {
     pub description: String,
     /// Start of the compensation in s.
     pub t_on: f64,
-    /// Whether the fault is estimated while it is not compensated.
+    /// Whether faults are also estimated while they are not compensated.
     #[serde(default)]
     pub monitor: bool,
-    /// The sample time of a sampled controller in s; its matrices describe the sampled plant.
+    /// The sample time of a sampled controller in s; all matrices then describe the sampled plant.
     pub sample_time: Option<f64>,
     /// The estimator of a sampled controller.
     pub estimator: Option<Estimator>,
-    /// The diagonal of W, p numbers, in 1/s; in a sampled controller without unit. Without it measurements are not
-    /// filtered.
+    /// The diagonal of W, the rates of the measurement filter, p numbers in 1/s; in a sampled controller without unit.
+    /// `None`: no filter.
     pub filter: Option<Vec<f64>>,
     /// A, n x n.
     #[serde(rename = "A")]
@@ -68,19 +68,19 @@ pub struct Design {
     /// C, p x n.
     #[serde(rename = "C")]
     pub c: Matrix,
-    /// D, p x m, of y = C x + D u, stated together with a filter; without it there is none.
+    /// D, p x m, of y = C x + D u, stated together with a filter; `None`: no feedthrough.
     #[serde(rename = "D")]
     pub d: Option<Matrix>,
     /// F_a, n x q.
     #[serde(rename = "F_a")]
     pub f_a: Matrix,
-    /// A_f, q x q; without it the fault is constant.
+    /// A_f, q x q; `None`: the faults are constant.
     #[serde(rename = "A_f")]
     pub a_f: Option<Matrix>,
-    /// P_f, q x p: the direct term of the fault estimate; without it there is none.
+    /// P_f, q x p: the direct term of the fault estimate; `None`: no direct term.
     #[serde(rename = "P_f")]
     pub p_f: Option<Matrix>,
-    /// The sliding-mode law that estimates the faults, if it is one.
+    /// The sliding-mode law that estimates the faults; `None`: a linear law.
     pub sliding_mode: Option<SlidingMode>,
     /// K_x, m x n.
     #[serde(rename = "K_x")]
@@ -109,31 +109,31 @@ pub struct Design {
     /// N_r, m x t: the feedforward of the references.
     #[serde(rename = "N_r")]
     pub n_r: Option<Matrix>,
-    /// The decay of u_t, which keeps the commands where they are when the law changes: u_t' = -transfer u_t, in 1/s; in
-    /// a sampled controller the fraction that decays in one sample. Without it the commands jump.
+    /// The decay of u_t, which prevents a jump of the commands when the law changes: u_t' = -transfer u_t, in 1/s; in a
+    /// sampled controller the fraction that decays in one sample. Without it the commands jump.
     pub transfer: Option<f64>,
     /// The n states.
     pub states: Vec<Signal>,
     /// The m actuators.
     pub actuators: Vec<Actuator>,
-    /// The p measurements; the inputs have the same names.
+    /// The p measurements; the inputs of the FMU have the same names.
     pub measurements: Vec<Measurement>,
     /// The q states of the fault model.
     pub faults: Vec<Fault>,
-    /// The t references; the inputs have the same names.
+    /// The t references; the inputs of the FMU have the same names.
     #[serde(default)]
     pub references: Vec<Signal>,
     /// The gains without an actuator, one entry for each actuator that may be gone.
     #[serde(default)]
     pub reconfigurations: Vec<Reconfiguration>,
-    /// The gains without several of them.
+    /// The gains without several actuators.
     #[serde(default)]
     pub combinations: Vec<Combination>,
     /// The feedback that does not need to know which actuator has failed.
     pub fallback: Option<Fallback>,
     /// The experiment that importers run by default.
     pub experiment: Defaults,
-    /// Matrices and operating points by a scheduling variable, in place of those above.
+    /// Matrices and operating points by a scheduling variable, in place of the constant ones.
     pub schedule: Option<Schedule>,
     /// The detection of faults, if there is one.
     pub detection: Option<DetectionDesign>,
@@ -143,7 +143,7 @@ pub struct Design {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Estimator {
-    /// All measurements, including those of the sample itself.
+    /// All measurements up to and including those of the present sample.
     Current,
     /// The measurements before the sample.
     Prediction,
@@ -165,7 +165,7 @@ pub struct SlidingMode {
 pub struct Defaults {
     /// End of the experiment.
     pub stop_time: f64,
-    /// The communication step. Without it, it is the sample time of a sampled controller; a continuous one states it.
+    /// The communication step; a continuous controller must state it, the default of a sampled one is the sample time.
     pub step_size: Option<f64>,
 }
 

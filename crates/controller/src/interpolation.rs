@@ -71,7 +71,8 @@ impl Schedule {
         slope
     }
 
-    /// Writes `mix` of both ends of the interval into each scheduled matrix and into the operating point.
+    /// Writes the combination `mix` of both ends of the interval into each scheduled matrix and into the operating
+    /// point.
     fn write(&self, interval: usize, mix: impl Fn([f64; 2]) -> f64, design: &mut Design) {
         let [from, to] = [0, 1].map(|end| &self.points[interval + end]);
         let places = design.scheduled_mut();

@@ -44,17 +44,17 @@ pub struct KalmanDesign {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CarriedFault {
-    /// Its name.
+    /// The name of the fault.
     pub name: String,
-    /// Its unit, as FMI writes it.
+    /// The unit of the fault, as FMI writes it.
     pub unit: Option<String>,
-    /// What it is, for a reader.
+    /// The description of the fault for a reader.
     #[serde(default)]
     pub description: String,
-    /// Where it enters.
+    /// The signal to which the fault is added.
     pub enters: Entry,
-    /// The position of the rate of a ramp among the states of the fault model; none for a constant fault. The first of
-    /// these states are the faults, in their order.
+    /// For a ramp, the position of its rate among the states of the fault model; `None` for a constant fault. The first
+    /// states of the fault model are the faults, in their order.
     pub rate: Option<usize>,
 }
 
@@ -62,11 +62,11 @@ pub struct CarriedFault {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Entry {
-    /// It adds to the command at this position.
+    /// The command at this position.
     Actuator(usize),
-    /// It adds to the measurement at this position.
+    /// The measurement at this position.
     Sensor(usize),
-    /// It adds to the value of this input of the plant's FMU.
+    /// The input of the plant's FMU with this name.
     Input(String),
 }
 

@@ -96,12 +96,12 @@ fn numbers(lines: &mut Lines, [name, size]: [&str; 2], values: impl Iterator<Ite
     list(lines, &format!("uint32_t {name}[{size}]"), wrapped(values, "    "));
 }
 
-/// Adds a table of flags; `head` is its name with its sizes.
+/// Adds a table of flags; `head`: the name of the table with its sizes.
 fn flags(lines: &mut Lines, head: &str, rows: impl Iterator<Item = Vec<String>>) {
     list(lines, &format!("bool {head}"), rows.map(|row| format!("    {{{}}},", row.join(", "))));
 }
 
-/// Adds a table of these rows; `head` is its type and its name with its sizes.
+/// Adds a table of `rows`; `head`: the type and the name of the table with its sizes.
 fn list(lines: &mut Lines, head: &str, rows: impl IntoIterator<Item = String>) {
     lines.push(format!("static const {head} =\n{{"));
     lines.extend(rows);

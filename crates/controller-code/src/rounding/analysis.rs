@@ -13,7 +13,7 @@ use crate::numbers::{Memory, Numbers, Vectors};
 use crate::symbols::{Kind, Vector};
 use aso_controller::design::{Estimator, SlidingMode};
 
-/// Follows the equations of a sample, and collects their rounding errors.
+/// Follows the equations of a sample, and collects the rounding errors.
 pub(super) struct Analysis<'a> {
     controller: &'a Controller,
     /// A bound of the elements of `x_r`, states x signals; see [`super::residual_states`].
@@ -28,7 +28,7 @@ pub(super) struct Analysis<'a> {
 
 /// An input v of a sliding-mode law.
 struct Chord {
-    /// The position of its row, of zeros, in `errors`.
+    /// The position of the row of v in `errors`; the row is zero.
     position: usize,
     /// Half of the largest slope of a chord, rho / (2 delta).
     half_slope: f64,
@@ -183,8 +183,8 @@ impl<'a> Analysis<'a> {
         magnitude
     }
 
-    /// Whether a vector is an estimate that a current estimator has not corrected yet: its size follows from the
-    /// signals of the sample before.
+    /// Whether a vector is an estimate that a current estimator has not corrected yet: the size of such an estimate
+    /// follows from the signals of the sample before.
     fn is_predicted(&self, vector: Vector) -> bool {
         let is_first = || !self.history.iter().any(|(other, _)| *other == vector);
         let is_current = self.controller.estimator == Estimator::Current;
@@ -245,7 +245,7 @@ impl<'a> Analysis<'a> {
         all
     }
 
-    /// Adds a computed vector to the history; its errors become elements of w.
+    /// Adds a computed vector to the history; its rounding errors become new error variables w.
     fn record(&mut self, vector: Vector, mut elements: Elements) {
         elements.magnitude = self.magnitude(vector);
         for (i, error) in elements.error.row_iter().enumerate() {
@@ -339,7 +339,7 @@ impl<'a> Analysis<'a> {
     }
 
     /// Same as [`Self::record_all`] for the vector `meaning`, which the equations store in `place`; does nothing if the
-    /// design does not have it.
+    /// design does not have this vector.
     fn record_as(&mut self, vectors: &mut Vectors<Rounded>, place: Vector, meaning: Vector) {
         let numbers = vectors.get_mut(place);
         if numbers.is_empty() {
@@ -390,8 +390,8 @@ impl<'a> Analysis<'a> {
         Ok(linear.rows(0, outputs) + back.rows(0, outputs) * of_s)
     }
 
-    /// Whether [`Self::bound`], for the largest signals, is smaller than these signals: then rounding does not make the
-    /// loop unstable.
+    /// Whether [`Self::bound`] for the largest signals is smaller than these signals, so that rounding does not make
+    /// the loop unstable.
     pub(super) fn contracts(&self, bound: &DMatrix<f64>) -> bool {
         let [n, q, p, m, _, integrals] = Kind::ALL.map(|kind| self.count(kind));
         let residuals = self.count(Kind::Residual);

@@ -150,7 +150,7 @@ impl Mul for Rounded {
 impl Div for Rounded {
     type Output = Self;
 
-    /// A quotient with a signal is not analysed here; `Analysis` bounds that of a sliding-mode law itself.
+    /// A quotient with a signal is not analysed here; `Analysis` bounds the quotient of a sliding-mode law.
     fn div(self, other: Self) -> Self {
         match (self, other) {
             (Self::Constant(a), Self::Constant(b)) => Self::Constant(a / b),

@@ -10,7 +10,7 @@ use crate::text::Lines;
 use aso_controller::design::Estimator;
 
 impl Source<'_> {
-    /// The imports of the library from the sources that are the same for each design.
+    /// The imports of the library from the sources that all designs share.
     pub(super) fn imports(&self) -> String {
         let mut lines = Lines::default();
         if let Some(detection) = &self.controller.detection {
@@ -30,7 +30,7 @@ impl Source<'_> {
         lines.0.join("\n")
     }
 
-    /// Adds the function that takes a sample, and the functions that it calls.
+    /// Adds the function that takes a sample, and the functions called by it.
     pub(super) fn step(&self, lines: &mut Lines) {
         let Self { controller, fields, real, .. } = self;
         let (mut parameters, mut inputs) = (String::new(), String::new());
@@ -156,8 +156,8 @@ impl Controller {{
         lines.push("        } else {");
     }
 
-    /// The counter of samples that the detection uses: since the controller rested if it can rest, else since the
-    /// start.
+    /// The name of the counter of samples for the detection: since the controller rested if it can rest, otherwise
+    /// since the start.
     fn running(&self) -> &'static str {
         if self.controller.counts_since_rest() { "self.running" } else { "self.sample" }
     }
@@ -204,8 +204,8 @@ impl Controller {{
         }
     }
 
-    /// Adds the place in the grid, the operating point there, and the limits as deviations from it; nothing without a
-    /// schedule.
+    /// Adds the grid interval of theta, the operating point, and the limits as deviations from the operating point;
+    /// nothing without a schedule.
     fn follow_schedule(&self, lines: &mut Lines) {
         let controller = self.controller;
         let Some(schedule) = &controller.schedule else { return };
@@ -321,7 +321,7 @@ impl Controller {{
         lines.push(format!("            y: &self.y,\n            r: &{r},\n        }};"));
     }
 
-    /// Adds the equations of a sample, and the storage of its results.
+    /// Adds the equations of a sample and the statements that store the results.
     fn take_sample(&self, lines: &mut Lines) {
         let controller = self.controller;
         lines.push(

@@ -15,7 +15,7 @@ const MOST_SAMPLES: f64 = 1e6;
 pub struct Refusal {
     /// The entry.
     pub name: String,
-    /// Its value.
+    /// The value of the entry.
     pub value: f64,
     /// The range.
     pub rule: &'static str,
@@ -172,7 +172,7 @@ impl Design {
         None
     }
 
-    /// Describes the first entry that is missing, not allowed, or does not fit the others.
+    /// Describes the first entry that is missing, not allowed, or in contradiction to other entries.
     fn contradiction(&self) -> Option<String> {
         let lists = [
             (self.states.len(), "state"),
@@ -388,7 +388,7 @@ impl Design {
         Some(Refusal::new(channel("filter", k, filter.len()), filter[k], rule))
     }
 
-    /// The decay of the transfer, if it is out of its range.
+    /// A refusal of `transfer`, if it is out of range.
     fn refused_transfer(&self) -> Option<Refusal> {
         let (most, rule) = self.rates();
         let value = self.transfer.filter(|value| !(*value > 0.0 && *value <= most))?;

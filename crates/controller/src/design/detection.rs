@@ -44,7 +44,7 @@ pub struct DetectionDesign {
     pub start: Matrix,
     /// The faults that `fault_isolated` counts, from 1.
     pub faults: Vec<String>,
-    /// The tests. Each takes the next `residuals` rows of r; together they take all rows.
+    /// The tests. Each test takes the next `residuals` rows of r, so that together the tests take all rows.
     pub tests: Vec<TestDesign>,
 }
 
@@ -52,9 +52,9 @@ pub struct DetectionDesign {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TestDesign {
-    /// Its name, that of its output.
+    /// The name of the test and of its output.
     pub name: String,
-    /// How many rows of r it takes.
+    /// The number of rows of r that the test takes.
     pub residuals: usize,
     /// kappa of the cumulative sums.
     pub drift: Option<f64>,

@@ -8,7 +8,7 @@ use super::Refusal;
 pub struct DesignError {
     /// The file.
     pub path: String,
-    /// Why it cannot be used.
+    /// The reason why the file cannot be used.
     pub reason: Reason,
 }
 
@@ -24,11 +24,11 @@ pub enum Reason {
     Shape {
         /// The matrix or the list.
         what: &'static str,
-        /// Its shape.
+        /// The actual shape.
         actual: String,
-        /// The shape that it must have.
+        /// The required shape.
         expected: String,
-        /// The signals of its rows and columns.
+        /// The signals of the rows and columns.
         meaning: String,
     },
     /// A number is out of its range.

@@ -4,18 +4,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::matrix::Matrix;
 
-/// The gains without an actuator, and when it counts as gone; see `fmu-controller/src/reconfiguration.rs`.
+/// The gains without an actuator, and when the actuator counts as gone; see `fmu-controller/src/reconfiguration.rs`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reconfiguration {
     /// The actuator that is gone.
     pub gone: String,
-    /// Its position; set when the file is read.
+    /// The position of the actuator that is gone; set when the file is read.
     #[serde(default)]
     pub actuator: usize,
-    /// The command at which it is stuck.
+    /// The command at which the actuator is stuck.
     pub stuck_at: f64,
-    /// K_x, m x n. It is missing, with K_f and K_s, if only the fall-back serves this case.
+    /// K_x, m x n. `None`, like K_f and K_s, if only the fall-back serves this case.
     #[serde(rename = "K_x")]
     pub k_x: Option<Matrix>,
     /// K_f, m x q.
@@ -27,23 +27,23 @@ pub struct Reconfiguration {
     /// The states of the fault model that restart at 0 when the actuator fails or comes back.
     #[serde(default)]
     pub restart: Vec<String>,
-    /// Their positions; set when the file is read.
+    /// The positions of the states in `restart`; set when the file is read.
     #[serde(default)]
     pub restarted: Vec<usize>,
     /// The actuator counts as gone after its estimated loss of effectiveness has been above `loss` for `time` s.
-    /// Without both, only an input of the FMU reports it.
+    /// Without `loss` and `time`, only an input of the FMU reports the failure.
     pub loss: Option<f64>,
     /// See `loss`; in s.
     pub time: Option<f64>,
 }
 
-/// The gains without several actuators; each of them has a [`Reconfiguration`], too.
+/// The gains without several actuators, each of which also has a [`Reconfiguration`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Combination {
     /// The actuators that are gone, in the order of the actuators.
     pub gone: Vec<String>,
-    /// Bit j: actuator j is one of them; set when the file is read.
+    /// Bit j: actuator j is gone; set when the file is read.
     #[serde(default)]
     pub mask: u64,
     /// K_x, m x n.
@@ -52,7 +52,7 @@ pub struct Combination {
     /// K_f, m x q.
     #[serde(rename = "K_f")]
     pub k_f: Matrix,
-    /// K_s, m x (the number of actuators that are gone), in their order.
+    /// K_s, m x (the number of actuators that are gone), columns in the order of `gone`.
     #[serde(rename = "K_s")]
     pub k_s: Matrix,
 }
@@ -64,12 +64,12 @@ pub struct Fallback {
     /// K_x, m x n.
     #[serde(rename = "K_x")]
     pub k_x: Matrix,
-    /// K_f, m x q; without it the estimated faults are not compensated.
+    /// K_f, m x q; `None`: the estimated faults are not compensated.
     #[serde(rename = "K_f")]
     pub k_f: Option<Matrix>,
 }
 
-/// The gains in force in place of those of the intact plant.
+/// The gains that replace the gains of the intact plant.
 #[derive(Clone, Copy)]
 pub enum GainSet<'a> {
     /// The gains without one actuator.

@@ -8,7 +8,7 @@ use crate::matrix::Matrix;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schedule {
-    /// The name of the scheduling variable: a measurement, or an input of its own.
+    /// The name of the scheduling variable: a measurement, or a separate input.
     pub variable: String,
     /// The unit of the input.
     pub unit: Option<String>,
@@ -19,7 +19,8 @@ pub struct Schedule {
     pub points: Vec<Point>,
 }
 
-/// The matrices and the operating point at a value of the scheduling variable; they replace those of the design.
+/// The matrices and the operating point at a value of the scheduling variable, in place of the constant ones of the
+/// design.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Point {

@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 /// Unit and meaning of a signal.
 #[derive(Clone, Copy)]
 pub struct Label<'a> {
-    /// Its unit.
+    /// The unit of the signal.
     pub unit: Option<&'a String>,
-    /// Its description, or its name if it has none.
+    /// The description of the signal, or the name if it has no description.
     pub meaning: &'a str,
 }
 
@@ -18,7 +18,7 @@ pub struct Loss {
     pub fault: usize,
     /// The position of the actuator.
     pub actuator: usize,
-    /// u_e, the command at which the estimate is half of the loss; it tends to the loss for larger commands.
+    /// u_e, the command at which the estimate is half of the loss; for larger commands the estimate tends to the loss.
     pub least_command: f64,
 }
 
@@ -29,12 +29,12 @@ macro_rules! signals {
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields)]
         pub struct $signal {
-            /// Its name, that of its variables.
+            /// The name of the signal and of its variables.
             pub name: String,
-            /// Its unit, as FMI writes it.
+            /// The unit of the signal, as FMI writes it.
             #[serde(default)]
             pub unit: Option<String>,
-            /// What it is, for a reader.
+            /// The description of the signal for a reader.
             #[serde(default)]
             pub description: String,
             $($(#[$text])* #[serde(default)] pub $entry: $kind,)*
@@ -57,18 +57,18 @@ signals! {
         operating: Option<f64>,
     }
 
-    /// A measurement, with its range and its longest hold if it has them; see [`crate::sample::measurements`].
+    /// A measurement, optionally with a range and a longest hold; see [`crate::sample::measurements`].
     Measurement {
         /// Value at the operating point.
         operating: Option<f64>,
-        /// The smallest and the largest value that is used. The last value within them replaces a value outside.
+        /// The smallest and the largest valid value; the last valid value replaces a value outside.
         range: Option<[f64; 2]>,
-        /// The longest time in s for which the last value replaces others; after it the controller rests at its
+        /// The longest time in s for which the last valid value is used; afterwards the controller rests at its
         /// operating point.
         longest_hold: Option<f64>,
     }
 
-    /// An actuator, with its limits if it has any.
+    /// An actuator, optionally with limits.
     Actuator {
         /// Command at the operating point.
         operating: Option<f64>,

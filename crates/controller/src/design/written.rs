@@ -6,10 +6,10 @@ use super::Design;
 use super::schedule::{Point, Schedule};
 use crate::matrix::Matrix;
 
-/// Lists, and the keys of their entries that [`Design::parse`] computes; these are not written.
+/// Lists of the file, with the keys of their entries that are not written, because [`Design::parse`] computes them.
 const POSITIONS: [(&str, &[&str]); 2] =
     [("reconfigurations", &["actuator", "restarted"]), ("combinations", &["mask"])];
-/// The matrices that are written first, in order; the others follow.
+/// The matrices that are written first, in this order; other matrices follow.
 const FIRST: [&str; 6] = ["A", "B", "C", "F_a", "A_f", "D"];
 
 impl Design {
