@@ -25,8 +25,8 @@ use crate::signals::{OperatingPoint, Signals, Values};
 use crate::validity::MeasurementCheck;
 use aso_controller::Design;
 
-/// How far a free command must pass a limit, as a fraction of the actuator's range, or an estimated loss its stated
-/// fraction, before this is an event. So no event indicator is zero after an event, and rounding causes no second one.
+/// How far a free command must pass a limit, as a fraction of the actuator's range, or an estimated loss its threshold,
+/// to cause an event. Thus no event indicator is zero after an event, and rounding causes no second event.
 const HYSTERESIS: f64 = 1e-9;
 
 /// A fault-tolerant controller with an augmented state observer, for a linear plant of any size.
@@ -69,14 +69,14 @@ pub struct AsoController {
     sampler: Option<Sampler>,
     /// `None` without a detection of faults.
     detector: Option<Detector>,
-    /// The measurements that the importer sets, while `values` has those that are used; `None` if every one is used.
+    /// The measurements that the importer sets; `values` has the measurements that are used. `None` if all are used.
     measurement_check: Option<MeasurementCheck>,
     /// The clock variable, which the importer ticks. The controller finds its samples by time, not by this clock.
     pub(crate) sample_clock: bool,
     /// The design at the scheduling variable of the last sample, or of now in a continuous controller; `None`
     /// without a schedule.
     current: Option<Box<Design>>,
-    /// The scheduling variable if it is an input, and its slope.
+    /// The scheduling variable and its slope, if the variable is an input.
     pub(crate) schedule_input: f64,
     pub(crate) schedule_slope: f64,
     /// The value of the scheduling variable for which `current` was computed.

@@ -35,7 +35,7 @@ fn measurements(design: &Design) -> Vec<String> {
     design.measurements.iter().map(|signal| signal.name.clone()).collect()
 }
 
-/// The references that commands depend on: all of them with a feedforward, none without.
+/// The references that commands depend on: all references with a feedforward, otherwise none.
 fn fed_forward(design: &Design) -> Vec<String> {
     let references = if design.n_r.is_some() { &design.references[..] } else { &[] };
     references.iter().map(|signal| signal.name.clone()).collect()
@@ -70,7 +70,7 @@ fn of_law(design: &Design, [state, fault]: [DependencyKind; 2]) -> Vec<Group> {
     groups
 }
 
-/// The dependencies of all commands: those of [`of_law`] and u_t.
+/// The dependencies of all commands: on the variables of [`of_law`] and on u_t.
 fn of_feedback(design: &Design, kinds: [DependencyKind; 2]) -> Vec<Group> {
     let mut groups = of_law(design, kinds);
     groups.extend(transfers(design, true));
@@ -89,7 +89,7 @@ fn transfers(design: &Design, limited: bool) -> Option<Group> {
     (!names.is_empty()).then(|| (kinds_of_feedback(design, limited)[0], names))
 }
 
-/// The dependencies of command `j`: those of [`of_law`] and its own u_t.
+/// The dependencies of command `j`: on the variables of [`of_law`] and on the u_t of this command.
 fn of_feedback_of(design: &Design, j: usize, kinds: [DependencyKind; 2]) -> Vec<Group> {
     let mut groups = of_law(design, kinds);
     let kind = if kinds[0] == Fixed { Constant } else { kinds[0] };
@@ -141,8 +141,8 @@ pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
     }
 }
 
-/// `groups`; in a controller that checks measurements, constant factors become discrete, because they change when the
-/// last value replaces a measurement.
+/// Returns `groups`. In a controller that checks measurements, constant factors become discrete, because they change
+/// when the last value replaces a measurement.
 fn groups_by_validity(design: &Design, mut groups: Vec<Group>) -> Vec<Group> {
     if design.checks_measurements() {
         for (kind, _) in &mut groups {
@@ -318,7 +318,7 @@ pub(crate) fn groups_by_schedule(design: &Design, groups: Vec<Group>) -> Vec<Gro
     vec![(Dependent, by_schedule(design, names))]
 }
 
-/// `names`; with a schedule the matrices are no parameters, and the scheduling variable replaces them.
+/// Returns `names`. With a schedule, the scheduling variable replaces the matrices, which are then no parameters.
 fn by_schedule(design: &Design, mut names: Vec<String>) -> Vec<String> {
     let Some(schedule) = &design.schedule else { return names };
     let elements =

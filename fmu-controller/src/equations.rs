@@ -93,7 +93,7 @@ pub(crate) struct Knowns<'a, D: Number> {
 }
 
 impl<D: Number> Knowns<'_, D> {
-    /// The same signals with no innovation.
+    /// A copy of the signals with innovations of zero.
     pub(crate) fn without_innovations(self) -> Self {
         Self { e: D::part(self.e, |e| &e[..0]), ..self }
     }
@@ -374,8 +374,8 @@ impl<'a, D: Number> Equations<'a, D> {
 }
 
 impl Mode {
-    /// The same mode with other channels at a limit: those whose free command at `z` and the inputs y and r
-    /// (deviations) is beyond the limit, and whose actuator is not gone.
+    /// The mode in which a channel is at a limit if its free command, at `z` and the inputs y and r (deviations), is
+    /// beyond the limit and its actuator is not gone.
     pub(crate) fn limited(self, design: &Design, z: &[f64], inputs: [&[f64]; 2]) -> Self {
         let mut mode = self;
         (mode.lower, mode.upper) = (0, 0);

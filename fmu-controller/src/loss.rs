@@ -43,8 +43,8 @@ impl Loss {
         design.losses().into_iter().map(loss).collect()
     }
 
-    /// The estimate of its fault: an element of `f_hat`, or, if `f_hat` is empty (no direct term), the element of `z`
-    /// after `n` states.
+    /// The estimate of the fault of this loss: an element of `f_hat`, or, if `f_hat` is empty (no direct term), the
+    /// element of `z` after `n` states.
     pub(crate) fn fault_of(&self, f_hat: &[f64], z: &[f64], n: usize) -> f64 {
         *f_hat.get(self.fault).unwrap_or(&z[n + self.fault])
     }

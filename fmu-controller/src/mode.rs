@@ -17,7 +17,7 @@ pub(crate) struct Mode {
     pub(crate) upper: u64,
     /// Bit j: the actuator of channel j is gone.
     pub(crate) gone: u64,
-    /// Whether the gains are those of the fall-back.
+    /// Whether the gains of the fall-back are in force.
     fallen_back: bool,
 }
 
@@ -54,9 +54,9 @@ impl Mode {
         (0..64).filter(move |j| self.is_gone(*j))
     }
 
-    /// The gains that replace those of the intact plant: those of the fall-back, those without all actuators that are
-    /// gone or, if the design has none for these, those without the first one. `None` if the gains of the intact plant
-    /// are in force.
+    /// The gains that replace the gains of the intact plant: of the fall-back, otherwise the gains without all
+    /// actuators that are gone or, if the design states none, without the first of these actuators. `None` if the gains
+    /// of the intact plant are in force.
     pub(crate) fn gains(self, design: &Design) -> Option<GainSet<'_>> {
         if self.fallen_back {
             return design.fallback.as_ref().map(GainSet::Fallback);
@@ -106,7 +106,7 @@ impl Mode {
         Some(self.held_command(design, j)? - design.actuators[j].operating.unwrap_or(0.0))
     }
 
-    /// Sets the deviations `u` of the channels that are at a limit or stuck; the others stay.
+    /// Sets the deviations `u` of the channels that are at a limit or stuck; other channels are not changed.
     pub(crate) fn set_limited(self, design: &Design, u: &mut [f64]) {
         for (j, u) in u.iter_mut().enumerate() {
             if self.is_limited(j) {

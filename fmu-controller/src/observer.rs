@@ -217,7 +217,8 @@ impl Observer {
         Ok(())
     }
 
-    /// Computes `after` from `before` over `part` in `mode`; returns whether the mode at its end is the same.
+    /// Computes `after` from `before` over `part` in `mode`; returns whether the mode is the same at the end of the
+    /// part.
     fn keeps_mode(
         &mut self,
         mode: Mode,

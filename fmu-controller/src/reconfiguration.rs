@@ -39,7 +39,8 @@ use aso_controller::clock::clock_rounding;
 pub(crate) struct Reconfigurator {
     /// The inputs, one for each actuator.
     pub(crate) reported: Vec<bool>,
-    /// For each reconfiguration of the design: the time in s since which its loss is above the stated fraction.
+    /// For each reconfiguration of the design: the time in s since which its estimated loss has been above the stated
+    /// fraction.
     above_since: Vec<Option<f64>>,
     /// The input that asks for the fall-back.
     pub(crate) fall_back: bool,
@@ -47,7 +48,7 @@ pub(crate) struct Reconfigurator {
     decided: u64,
     /// Bit j: actuator j is gone.
     pub(crate) gone: u64,
-    /// Whether the gains are those of the fall-back.
+    /// Whether the gains of the fall-back are in force.
     pub(crate) fallen_back: bool,
     /// The output: from 1, the position of the first actuator that is gone; 0 if there is none, -1 in the
     /// fall-back.

@@ -40,8 +40,8 @@ pub(crate) struct Sampler {
     estimator: Estimator,
     /// The instants of the samples.
     pub(crate) clock: Clock,
-    /// z[k|k-1] of the next sample as the importer will see it, not as deviations: so an initial value has no rounding
-    /// of the operating point.
+    /// z[k|k-1] of the next sample in absolute values, as the importer sees it, so that an initial value has no
+    /// rounding of the operating point.
     prediction: Vec<f64>,
     /// The deviations z[k|k-1] of the last sample.
     last_prediction: Vec<f64>,

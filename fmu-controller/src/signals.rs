@@ -75,7 +75,7 @@ impl OperatingPoint {
         point
     }
 
-    /// Sets the operating point to that of `design`, without allocation.
+    /// Copies the operating point of `design`, without allocation.
     pub(crate) fn read(&mut self, design: &Design) {
         let Self { z, y, r, .. } = self;
         change_by_operating_point([z, y, r], design, |element, operating| *element = operating);
@@ -95,8 +95,7 @@ impl Signals {
         Self { z: zeros(design.order()), y: zeros(p), r: zeros(t), e: zeros(p), f_hat, u: zeros(m) }
     }
 
-    /// Sets z, y and r to the deviations of `values` from `point`, the inputs `offset` s after these were
-    /// given.
+    /// Sets z, y and r to the deviations of `values` from `point`, with y and r extrapolated by `offset` s.
     pub(crate) fn set(&mut self, values: &Values, point: &OperatingPoint, offset: f64) {
         for ((z, value), point) in self.z.iter_mut().zip(&values.z).zip(&point.z) {
             *z = value - point;
@@ -156,8 +155,8 @@ impl Values {
         }
     }
 
-    /// Sets u to the operating point plus the deviations `u`, channels at a limit to that limit, and stuck ones to
-    /// their stuck command.
+    /// Sets u to the operating point plus the deviations `u`. A channel at a limit gets the limit, a stuck channel its
+    /// stuck command.
     pub(crate) fn set_commands(
         &mut self,
         u: &[f64],

@@ -1,4 +1,4 @@
-//! Bumpless transfer: commands that stay where they are when their law changes.
+//! Bumpless transfer: the commands do not jump when their law changes.
 
 use crate::equations::Equations;
 use crate::mode::Mode;

@@ -32,7 +32,7 @@ pub(crate) struct MeasurementCheck {
     last: Vec<f64>,
     /// The values at a sample.
     sampled: Vec<f64>,
-    /// The number of samples for which a sampled controller uses the last value, and the largest number.
+    /// The number of samples for which a sampled controller has used the last value, and the most for which it may.
     held: Vec<u32>,
     most_held: Vec<u32>,
     /// The time in s since which a continuous controller uses the last value, and the longest duration in s.

@@ -125,7 +125,7 @@ impl Carrier {
         }
     }
 
-    /// Updates `estimate` by `call` on the filter; an error of the call does not change it.
+    /// Updates `estimate` by `call` on the filter; an error of the call leaves `estimate` unchanged.
     fn update<T>(
         &self,
         estimate: &mut Estimate,
@@ -177,7 +177,7 @@ impl Carrier {
 }
 
 /// The plant with z = [x; faults; their rates]: x' = f(t, x, u + faults), y = h(t, x, u + faults) + faults; the
-/// derivative of a fault is its rate, or 0 if it has none, and that of a rate is 0.
+/// derivative of a fault is its rate, or 0 if it has none; the derivative of a rate is 0.
 struct CarriedPlant {
     equations: PlantEquations,
     faults: Vec<Channel>,
@@ -185,7 +185,7 @@ struct CarriedPlant {
     n: usize,
     /// The commands of the sample.
     u: Vec<f64>,
-    /// The values without faults of the inputs to which faults are added.
+    /// The values, without faults, of the inputs to which faults are added.
     free_inputs: Vec<f64>,
     /// All inputs of the plant with the faults.
     inputs: Vec<f64>,
@@ -196,7 +196,7 @@ struct CarriedPlant {
     steps: i32,
     /// z' at the four points of a step.
     slopes: [Vec<f64>; 4],
-    /// z at one of these points.
+    /// z at a point of a Runge-Kutta step.
     point: Vec<f64>,
     /// z at the end of a step.
     ahead: Vec<f64>,
@@ -336,8 +336,8 @@ impl CarriedPlant {
         Ok(())
     }
 
-    /// Sets `ahead` to z after an integration step of `size` in s from `z` at `start`; with `g`, the derivative of `z`
-    /// by the z at which the prediction began, also that of `ahead`.
+    /// Sets `ahead` to z after an integration step of `size` in s from `z` at `start`. With `g`, the derivative of `z`
+    /// with respect to the z at which the prediction began, also sets this derivative of `ahead`.
     fn step(
         &mut self,
         z: &[f64],

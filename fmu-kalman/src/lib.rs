@@ -92,7 +92,7 @@ impl KalmanFilter {
         self.innovation_squared = 0.0;
     }
 
-    /// Sets the standard deviations to those of the covariance.
+    /// Sets the standard deviations of the estimates from the covariance.
     fn set_deviations(&mut self) {
         let n = self.deviations.len();
         let variances = self.estimate.covariance.iter().step_by(n + 1);

@@ -92,7 +92,7 @@ struct Position<D> {
 }
 
 impl<D: Number> RigidBody<D> {
-    /// The body with these parameters, which must have passed their check.
+    /// Creates the body from checked parameters.
     pub(crate) fn new(parameters: &Parameters<D>) -> Self {
         let coupling = parameters.pendulum_mass * parameters.length;
         Self {

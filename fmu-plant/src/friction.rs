@@ -42,7 +42,7 @@ pub(crate) struct StribeckLaw<D = f64> {
 }
 
 impl<D: Number> StribeckLaw<D> {
-    /// The law with these parameters, which must have passed their check.
+    /// Creates the law from checked parameters.
     pub(crate) fn new(parameters: &Parameters<D>) -> Self {
         Self {
             coulomb: parameters.coulomb,

@@ -121,7 +121,7 @@ impl Interval {
         self.start + self.elapsed
     }
 
-    /// Whether `rest` is the part of this interval that is not integrated. Its end may differ by rounding.
+    /// Whether `rest` is the part of this interval that is not integrated. The ends of both may differ by rounding.
     fn ends_with(&self, rest: &Self) -> bool {
         let (end, end_of_rest) = (self.start + self.duration, rest.start + rest.duration);
         self.time().to_bits() == rest.start.to_bits()

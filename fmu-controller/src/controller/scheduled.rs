@@ -78,7 +78,7 @@ impl AsoController {
     }
 }
 
-/// The scheduling variable `offset` s after the measurements were given: one of them, or an input of its own.
+/// The scheduling variable `offset` s after the measurements were given: one of the measurements, or a separate input.
 fn scheduling_variable(
     schedule: &Schedule,
     design: &Design,

@@ -54,8 +54,8 @@ impl AsoController {
         values.transfer(design, mode, operating_point, deviations)
     }
 
-    /// Sets u_t where compensation starts or ends within a step, at `time`, `offset` s after its start. The commands
-    /// that do not jump are then those of the old law at the deviations z.
+    /// Sets u_t where compensation starts or ends within a step, at `time`, `offset` s after its start, so that the
+    /// commands continue the old law at the deviations z.
     fn transfer_at(&mut self, compensating: bool, time: f64, offset: f64) {
         let after = self.free_mode(compensating);
         if self.design.transfer.is_none() || self.values.law == Some(after.law(&self.design)) {
@@ -153,7 +153,7 @@ impl AsoController {
         self.has_slopes = false;
     }
 
-    /// The detection of the design; an empty one if it has none.
+    /// The detection of the design; an empty one if the design has none.
     pub(crate) fn detection_mut(&mut self) -> &mut DetectionDesign {
         self.design.detection.get_or_insert_default()
     }
@@ -238,8 +238,8 @@ impl AsoController {
         self.has_slopes = false;
     }
 
-    /// Computes z', f_hat', u' and E_hat' unless they are up to date; returns the controller. They are zero if it is
-    /// sampled or rests.
+    /// Computes z', f_hat', u' and E_hat' unless they are up to date; returns the controller. The derivatives are zero
+    /// if the controller is sampled or rests.
     pub(crate) fn with_slopes(&mut self) -> &mut Self {
         if !self.has_slopes && self.sampler.is_none() {
             if self.is_resting() {

@@ -171,7 +171,7 @@ fn reconfiguration(design: &Design) -> Option<Variable> {
     design.is_reconfigurable().then(|| variable.output(&[]))
 }
 
-/// When a measurement is used, in words; empty where it always is.
+/// Describes in words when a measurement is used; empty if it always is.
 fn validity(signal: &Measurement) -> String {
     let range = signal.range.map(|[low, high]| format!("; used from {low} to {high}"));
     let hold = signal.longest_hold.map(|time| format!("; held for {time} s at most"));
@@ -257,7 +257,7 @@ fn states(design: &Design) -> Vec<State> {
         .collect()
 }
 
-/// The estimates of the faults in a design with a direct term, where they are no states.
+/// The variables of the fault estimates in a design with a direct term, where the estimates are no states.
 fn faults(design: &Design) -> Vec<Variable> {
     let count = design.p_f.as_ref().map_or(0, |p_f| p_f.rows);
     (0..count)

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use aso_controller::design::detection::DetectionDesign;
 
-/// The value of both times before an alarm.
+/// The value of `time` and `onset` before an alarm.
 const NEVER: f64 = -1.0;
 
-/// The decision, which stays until it is reset.
+/// The decision on faults, which stays until a reset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Decision {
     pub(crate) detected: bool,

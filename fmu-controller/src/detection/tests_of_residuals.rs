@@ -63,7 +63,7 @@ impl TestState {
         None
     }
 
-    /// Updates the cumulative sums; returns the time since which the larger one is above 0.
+    /// Updates the cumulative sums; returns the time since which the larger sum is above 0.
     fn add_to_sums(&mut self, drift: f64, residual: f64, time: f64) -> f64 {
         let signed = [residual, -residual];
         for ((sum, since), signed_residual) in self.sums.iter_mut().zip(&mut self.since).zip(signed)

@@ -24,14 +24,15 @@ const NOMINAL_ACCELERATION: f64 = 1.0;
 /// A cart that slides at most this fast, in m/s, and becomes slower has stopped.
 const REST: f64 = 1e-8 * NOMINAL_VELOCITY;
 
-/// The same velocity in event mode, in m/s: larger, because the importer may locate the stop a little too early.
+/// In event mode, a cart that slides at most this fast, in m/s, may have stopped: faster than [`REST`], because the
+/// importer may locate the stop a little too early.
 const LANDING: f64 = 10.0 * REST;
 
 /// How far the force on a held cart exceeds the static friction at its break-away, as a fraction of the
 /// static friction: more than an importer's integration errors, which would free the cart at once.
 const EXCESS: f64 = 1e-6;
 
-/// The same excess in N where there is no static friction: a force of zero is no event.
+/// The excess in N without static friction, so that a force of zero is no event.
 const FREE: f64 = 1e-10;
 
 /// The plant at an instant as an importer sees it.

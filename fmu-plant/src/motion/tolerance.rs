@@ -25,7 +25,7 @@ impl Default for Tolerance {
 }
 
 impl Tolerance {
-    /// The given relative tolerance and a thousandth of it as the absolute one.
+    /// The relative tolerance `relative`, and a thousandth of it as the absolute tolerance.
     ///
     /// A value outside of 1e-12 to 1e-3 is replaced by the nearest of these; an error for one that is not finite or not
     /// positive.

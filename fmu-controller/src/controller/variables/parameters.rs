@@ -179,7 +179,7 @@ fn operating_point(design: &Design) -> Vec<Variable> {
     all
 }
 
-/// The commands at which actuators are stuck when they are gone.
+/// The parameters for the commands at which actuators are stuck when they are gone.
 fn stuck(design: &Design) -> Vec<Variable> {
     let one = |(at, case): (usize, &Reconfiguration)| {
         let name = channel("u_stuck", case.actuator, design.actuators.len());
