@@ -85,8 +85,8 @@ impl Explicit {
         &self.slopes[6]
     }
 
-    /// Returns an estimate of `size |lambda|` for the dominant eigenvalue of the Jacobian, from the two
-    /// derivatives at the end of the step; 0 if both are at the same states. Components are divided by `weight`.
+    /// Returns an estimate of `size |lambda|` for the dominant eigenvalue of the Jacobian, from the two derivatives at
+    /// the end of the step; 0 if both derivatives are at the same states. Components are divided by `weight`.
     pub(crate) fn stiffness(&self, size: f64, weight: impl Fn(usize) -> f64) -> f64 {
         let (mut slopes, mut states) = (0.0, 0.0);
         for i in 0..self.end.len() {
@@ -109,7 +109,7 @@ impl Explicit {
     }
 }
 
-/// Computes `base + size * sum(weight * slope)`; without `base`, it is zero.
+/// Computes `base + size * sum(weight * slope)`, with zero for a missing `base`.
 fn combine(
     result: &mut [f64],
     base: Option<&[f64]>,

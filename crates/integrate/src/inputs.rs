@@ -12,7 +12,7 @@ pub(crate) const ORDERS: usize = 3;
 pub(crate) struct Inputs {
     /// Value references, ascending.
     references: Vec<u32>,
-    /// Their start values in the description, 0 if there is none.
+    /// The start values of the inputs in the description; 0 without a start value.
     starts: Vec<f64>,
     pub(crate) tracks: Vec<Track>,
     /// The indices of the inputs with a derivative other than zero.
@@ -152,7 +152,7 @@ impl Inputs {
         }
     }
 
-    /// Sets the inputs that change to their values at `time`.
+    /// Sets each input that varies in time to its value at `time`.
     pub(crate) fn apply(
         &mut self,
         instance: &mut dyn ModelExchange,

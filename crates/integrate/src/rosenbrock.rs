@@ -130,7 +130,7 @@ impl Rosenbrock {
         Ok(())
     }
 
-    /// The largest sum of magnitudes in a row of the Jacobian, weighted: a bound of its eigenvalues.
+    /// A bound of the moduli of the eigenvalues of the Jacobian: the largest sum of moduli in a row, weighted.
     pub(crate) fn bound_of_eigenvalues(&self, weight: impl Fn(usize) -> f64) -> f64 {
         let n = self.end.len();
         let row = |i: usize| -> f64 {

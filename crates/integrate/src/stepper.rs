@@ -25,7 +25,7 @@ const SMALL: f64 = 1e-3;
 const BORDER: f64 = 3.25;
 /// Number of steps beyond [`BORDER`] after which the equations are stiff.
 const STIFF_STEPS: u32 = 15;
-/// Number of steps within [`BORDER`], in a row, after which the steps beyond it no longer count.
+/// After this number of successive steps within [`BORDER`], earlier steps beyond [`BORDER`] no longer count.
 const OTHER_STEPS: u32 = 6;
 /// `size |lambda|` at which the explicit method is stable with some room.
 const STABLE: f64 = 2.0;
@@ -42,7 +42,8 @@ pub(crate) struct Memory {
     is_stiff: bool,
     /// Number of steps of the explicit method beyond [`BORDER`] since the count was last reset.
     suspicious: u32,
-    /// Number of steps within [`BORDER`] since the last one beyond it or the last reset, below [`OTHER_STEPS`].
+    /// Number of steps within [`BORDER`] since the last step beyond [`BORDER`] or the last reset, below
+    /// [`OTHER_STEPS`].
     others: u32,
     /// Number of steps of the stiff method within [`STABLE`], in a row.
     stable: u32,
@@ -72,7 +73,7 @@ impl From<CallError> for StepError {
     }
 }
 
-/// Makes steps; keeps the last one for its continuous extension.
+/// Integrates step by step; keeps the last step, so that states within it can be interpolated.
 pub(crate) struct Stepper {
     pub(crate) memory: Memory,
     method: Method,
@@ -270,7 +271,7 @@ impl Stepper {
         }
     }
 
-    /// The stiff method if it made the last step.
+    /// The stiff method; `None` if it did not make the last step.
     fn last_stiff(&self) -> Option<&Rosenbrock> {
         self.stiff.as_ref().filter(|_| self.last_is_stiff)
     }

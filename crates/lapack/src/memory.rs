@@ -45,7 +45,7 @@ impl Part {
         }
     }
 
-    /// Whether the entry belongs to this part.
+    /// Whether the entry belongs to this fraction.
     fn holds(self, row: usize, col: usize) -> bool {
         match self {
             Self::All => true,

@@ -28,15 +28,15 @@ pub struct PlantEquations {
     next_event: Option<f64>,
     inputs: Vec<u32>,
     outputs: Vec<u32>,
-    /// The states and inputs, with respect to which the rows are differentiated.
+    /// The states and inputs with respect to which the rows are differentiated.
     knowns: Vec<u32>,
     /// The rows (derivatives of the states, outputs) whose variable is none of `knowns`.
     unknown_rows: Vec<usize>,
-    /// The variables of these rows.
+    /// The variables of `unknown_rows`.
     unknowns: Vec<u32>,
     /// The directional derivatives of `unknowns` with respect to one known.
     derivatives: Vec<f64>,
-    /// The other rows, with the position of their variable in `knowns`.
+    /// The rows whose variable is one of `knowns`, with the position of the variable in `knowns`.
     known_rows: Vec<(usize, usize)>,
     /// The typical sizes of `knowns`.
     scales: Vec<f64>,

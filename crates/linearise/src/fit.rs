@@ -16,7 +16,7 @@ pub(super) struct Directions {
     pub(super) contrast: f64,
     /// Column indices in pivot order: the last columns are the least independent.
     order: Vec<usize>,
-    /// Absolute diagonal entries of R, in the same order.
+    /// Absolute diagonal entries of R, in pivot order.
     diagonal: Vec<f64>,
 }
 

@@ -37,7 +37,7 @@ use result::{MethodResult, RawResult, assemble};
 
 /// Communication steps in s that are tried if the FMU states none.
 const STEPS: [f64; 3] = [1e-3, 1e-2, 1e-4];
-/// Relative error below which no further step is tried.
+/// Relative error below which no further communication step is tried.
 const ACCURATE: f64 = 1e-6;
 
 /// A request: the FMU variables of the linear plant, and its operating point.

@@ -9,7 +9,7 @@ use super::point::row_name;
 use super::{Linearise, LineariseError, differences};
 use fmu_import::Interface;
 
-/// Relative size in its row below which an entry counts as rounding error.
+/// A dependence on a state that is left out is negligible if it is at most this fraction of the size of its row.
 const NEGLIGIBLE: f64 = 1e-12;
 
 /// x' = A x + B u + F f, y = C x + D u + G f, in the units of the variables.

@@ -15,7 +15,7 @@ use fmu_import::Fmu;
 /// Minimum and maximum number of steps of a record; more than 255 states need a longer one.
 const MIN_STEPS: usize = 8;
 const MAX_STEPS: usize = 512;
-/// Relative error below which longer records are not tried.
+/// Relative error of the result below which longer records are not tried.
 const SUFFICIENT_ERROR: f64 = 1e-8;
 /// The largest accepted relative error.
 const MAX_ERROR: f64 = 0.1;

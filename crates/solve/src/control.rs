@@ -221,7 +221,7 @@ impl Bond {
 pub struct EnergyControl {
     control: ForwardControl,
     relative: f64,
-    /// `absolute N_k`, above zero.
+    /// The absolute error bound of the power of each bond, `absolute N_k`, above zero.
     floors: Vec<f64>,
     /// The largest power `P_k` of each bond so far.
     largest: Vec<f64>,

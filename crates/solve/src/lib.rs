@@ -128,7 +128,7 @@ impl Scale {
 /// The next request of a [`Solver`], or the end of its iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Progress {
-    /// Evaluate G at `u_next`, then call `next` with both.
+    /// Evaluate G at `u_next`, then call `next` with `u_next` and the value of G.
     Evaluate,
     /// Set the matrix `dG/du` at this u ([`Solver::set_column`]), then call `next` again with the same u and G(u).
     Matrix,
@@ -162,8 +162,8 @@ pub trait Solver: Send {
     /// Starts a new solution.
     fn begin(&mut self);
 
-    /// Takes `g = G(u)` and computes the next u. It is in `u_next` if the result is [`Progress::Evaluate`];
-    /// otherwise `u_next` may hold anything. All three slices have the length of the [`Scale`].
+    /// Takes `g = G(u)` and computes the next u. Stores it in `u_next` if the result is [`Progress::Evaluate`];
+    /// otherwise `u_next` has no defined value. All three slices have the length of the [`Scale`].
     fn next(&mut self, u: &[f64], g: &[f64], u_next: &mut [f64]) -> Progress;
 
     /// Sets column `column` of `dG/du`, the derivative of G with respect to this component of u.

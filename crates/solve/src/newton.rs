@@ -20,7 +20,7 @@ const SINGULAR: f64 = 1e10;
 enum Stage {
     /// No call in this solution.
     First,
-    /// A request for the matrix at the same point.
+    /// The solver has requested the matrix at the present point.
     MatrixRequested,
     /// A step with the matrix computed at its start.
     NewMatrix,

@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-11;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Secants {
     n: usize,
-    /// The number of slots, each of which holds a pair.
+    /// The number of slots, with one pair of differences in each slot.
     capacity: usize,
     /// The slots in use, the newest pair first.
     order: Vec<usize>,
@@ -154,8 +154,8 @@ impl Secants {
         }
     }
 
-    /// Computes column `rank` of Q and R from the pair in `slot`. Returns false if its norm falls below the ratio
-    /// `filter`, is a rounding error of the change of the values, or is NaN.
+    /// Computes column `rank` of Q and R from the pair in `slot`. Returns false if the norm of the column falls below
+    /// the ratio `filter`, is a rounding error of the change of the values, or is NaN.
     fn orthogonalise(&mut self, slot: usize, rank: usize, weights: &[f64], filter: f64) -> bool {
         let n = self.n;
         let (done, rest) = self.orthonormal.split_at_mut(rank * n);

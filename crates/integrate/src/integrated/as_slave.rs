@@ -36,7 +36,7 @@ impl Integrated {
     }
 }
 
-/// Defines functions that call the same function of the instance.
+/// Defines functions that call the function of the same name of the instance.
 macro_rules! forward {
     ($($name:ident($($argument:ident: $kind:ty),*);)*) => {
         $(fn $name(&mut self, $($argument: $kind),*) -> Result<(), CallError> {
@@ -76,7 +76,8 @@ impl Slave for Integrated {
         self.instance.setup_experiment(experiment)
     }
 
-    /// Also iterates the first event and enters continuous-time mode, unless the master handles the events.
+    /// Exits initialization mode. Also iterates the first event and enters continuous-time mode, unless the master
+    /// handles the events.
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
         self.instance.exit_initialization_mode()?;
         self.point.mode = Mode::Event;

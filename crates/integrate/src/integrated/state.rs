@@ -19,7 +19,7 @@ pub(super) struct Saved {
 }
 
 impl Integrated {
-    /// Saves the state of the integration in a slot; the FMU saves its own.
+    /// Saves the state of the integration in a slot; the FMU itself saves the state of the FMU.
     pub(super) fn save_integration(&mut self, slot: usize) {
         if self.saved.len() <= slot {
             self.saved.resize(slot + 1, Saved::default());
@@ -57,7 +57,8 @@ impl Integrated {
             .map_err(|error| failed(format!("cannot serialise its state: {error}")))
     }
 
-    /// Restores both states from bytes of [`Integrated::serialize`]; on failure the integration keeps its state.
+    /// Restores the states of integration and FMU from bytes of [`Integrated::serialize`]; on failure the integration
+    /// keeps its state.
     pub(super) fn deserialize(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let read: Result<(Saved, Vec<u8>), _> = postcard::from_bytes(bytes);
         let (saved, fmu_state) =
