@@ -38,7 +38,8 @@ impl Actuators<'_> {
 pub struct Allocation {
     /// M of u = M `u_d`, m x m; the rows of failed inputs are zero.
     pub matrix: DMatrix<f64>,
-    /// 2-norm of B M - B divided by the 2-norm of B: the part of the effect that the remaining inputs cannot produce.
+    /// 2-norm of B M - B divided by the 2-norm of B: the fraction of the effect that the remaining inputs cannot
+    /// produce.
     pub residual: f64,
 }
 
@@ -101,7 +102,7 @@ pub struct Equilibrium {
     pub x: DVector<f64>,
     /// The m commands; 0 for failed inputs.
     pub u: DVector<f64>,
-    /// Norm of C x, the outputs that should be zero.
+    /// Norm of C x, the outputs that should be zero at the equilibrium.
     pub left: f64,
 }
 

@@ -125,7 +125,7 @@ impl Balance {
         Some(factor)
     }
 
-    /// S M S^-1: transforms a function M of the balanced matrix back to the coordinates of A.
+    /// Transforms a function M of the balanced matrix back to the coordinates of A: S M S^-1.
     pub(crate) fn restore(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * (self.scale[i] / self.scale[j]))
     }

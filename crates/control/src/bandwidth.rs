@@ -25,7 +25,7 @@ const SATURATED: f64 = 0.7;
 const STEPS: usize = 40;
 /// Least entry of the energies h of [`NaturalUnits`], relative to the largest, so that no unit is infinite.
 const FLOOR: f64 = 1e-12;
-/// Factor on a bandwidth at which the response is infinite, the frequency of an undamped mode.
+/// Factor on a bandwidth that is the frequency of an undamped mode, where the response is infinite.
 const DETUNING: f64 = 1.01;
 
 /// Units of inputs and outputs: each output is measured by the strongest effect of an input on it, then each input by
@@ -93,7 +93,7 @@ fn energies(system: &StateSpace, rate: f64) -> Result<DMatrix<f64>, Error> {
 /// A regulator or a filter with its loop gain at the bandwidth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ByBandwidth<T> {
-    /// Gain, solution of the Riccati equation, eigenvalues.
+    /// The regulator or filter: its gain, the solution of its Riccati equation and its eigenvalues.
     pub result: T,
     /// The largest singular value of the loop at the bandwidth: one to within 1e-6; larger, if unstable modes need a
     /// larger bandwidth; smaller, if no weight of the search gives one.

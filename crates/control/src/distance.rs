@@ -35,7 +35,7 @@ pub struct Distance {
     /// search ended at its limit of evaluations before a larger bound was proven, if the upper bound
     /// is within rounding, and with more than 24 states, for which the plane is not searched.
     pub lower: f64,
-    /// Upper bound, attained at `at`.
+    /// Upper bound of the distance, attained at `at`.
     pub upper: f64,
     /// The point of the complex plane, in the unit of A and not below the real axis: the eigenvalue
     /// that becomes uncontrollable or unobservable first.
@@ -100,7 +100,7 @@ pub fn from_unobservable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Distance,
     Pencil::new(&a.transpose(), &c.transpose())?.search()
 }
 
-/// The scaled pair.
+/// A pair (A, B), scaled for the search.
 struct Pencil {
     a: DMatrix<f64>,
     b: DMatrix<f64>,

@@ -52,7 +52,7 @@ impl Domain {
         }
     }
 
-    /// The eigenvalue of a constant signal: 0, in sampled time 1.
+    /// The eigenvalue of a constant signal: 0 in continuous, 1 in sampled time.
     pub(crate) fn constant(self) -> f64 {
         match self {
             Self::Continuous => 0.0,

@@ -134,9 +134,9 @@ type LeftSide = fn(&DMatrix<f64>, &DMatrix<f64>, &DMatrix<f64>) -> DMatrix<f64>;
 /// A Lyapunov equation of continuous or sampled time, written as remainder = 0.
 pub(crate) struct Equation {
     name: &'static str,
-    /// The left side plus Q, from A, P and Q.
+    /// Computes A' P + P A + Q, or A' P A - P + Q, from A, P and Q.
     remainder: LeftSide,
-    /// The sum of the absolute terms, from |A|, |P| and |Q|.
+    /// Computes the sum of the absolute terms from |A|, |P| and |Q|.
     terms: LeftSide,
     substitute: fn(&Triangular, &DMatrix<f64>) -> DMatrix<f64>,
     domain: Domain,

@@ -52,9 +52,9 @@ pub trait SampledPlant {
 /// How mean and covariance are transformed by the equations of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transform {
-    /// By tangents at the mean.
+    /// By the tangents of the equations at the mean (extended Kalman filter).
     Extended,
-    /// By 2 N points.
+    /// By the values of the equations at 2 N points (unscented Kalman filter).
     Unscented,
 }
 
@@ -104,7 +104,7 @@ pub struct NonlinearFilter {
     s: DMatrix<f64>,
     /// The covariance of y and z, p x N; overwritten in a correction.
     cross: DMatrix<f64>,
-    /// The transpose of H, then the gain K, N x p.
+    /// The transpose of H, overwritten by the gain K; N x p.
     gain: DMatrix<f64>,
     /// K V, N x p.
     gain_v: DMatrix<f64>,

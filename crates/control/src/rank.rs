@@ -157,7 +157,7 @@ pub fn unobservable_modes(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Vec<Mode
     modes_of(&Staircase::new(&a.transpose(), &c.transpose())?)
 }
 
-/// The uncontrollable modes of the pair of a staircase form; none if the pair is controllable.
+/// The uncontrollable modes of the pair with this staircase form; none if the pair is controllable.
 fn modes_of(staircase: &Staircase) -> Result<Vec<Mode>, Error> {
     if staircase.decision.is_full() {
         return Ok(Vec::new());

@@ -44,7 +44,7 @@ pub struct Certificate {
     /// concludes that the error ends in that ball; the proof shows that it ends in the smallest ellipsoid z' P z =
     /// constant around the ball, whose longest axis is sqrt(cond P) times as long.
     pub delta: f64,
-    /// Rank of (A, B); full.
+    /// Rank of (A, B), which is full.
     pub controllability: Rank,
     /// Rank of (`A_0`, `C_0`).
     pub observability: Rank,

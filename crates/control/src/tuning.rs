@@ -44,7 +44,7 @@ pub enum Transfer {
 /// A transfer function with its weight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// X.
+    /// The transfer function X.
     pub transfer: Transfer,
     /// W; in sampled time, at the frequencies that [`crate::weight::bilinear_frequency`] returns.
     pub weight: Weight,
@@ -71,7 +71,7 @@ pub struct Tuning<'a> {
     pub is_over: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// The largest weighted value.
+/// The largest weighted norm, its term and its frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedPeak {
     /// The H-infinity norm of W X, verified with a relative width of 1e-4.
@@ -85,9 +85,9 @@ pub struct WeightedPeak {
 /// The tuned parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tuned {
-    /// theta.
+    /// The parameters theta.
     pub parameters: DVector<f64>,
-    /// The largest weighted value.
+    /// The largest weighted norm with these parameters.
     pub peak: WeightedPeak,
 }
 

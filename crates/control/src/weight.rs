@@ -14,9 +14,9 @@ use std::iter::successors;
 /// T / 2), see [`bilinear_frequency`]. A weight for mapped frequencies has the stated magnitudes in sampled time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weight {
-    /// `b_r` to `b_0`.
+    /// Coefficients `b_r` to `b_0` of the numerator.
     numerator: Vec<f64>,
-    /// 1 to `a_0`.
+    /// Coefficients of the denominator, from 1 to `a_0`.
     denominator: Vec<f64>,
     /// The unit of s, in rad/s.
     unit: f64,

@@ -4,7 +4,7 @@
 /// probability, which is at most 1.
 const NEGLIGIBLE: f64 = 1e-17;
 const MOST_TERMS: u32 = 1_000_000;
-/// The largest noncentrality whose series is summed.
+/// The largest noncentrality for which the series is summed; above, a normal approximation is used.
 const LARGEST: f64 = 1e6;
 /// In double precision, a noncentral chi-square variable is above a point this many standard deviations below its mean
 /// with probability 1.
@@ -118,7 +118,7 @@ pub(super) fn normal_density(x: f64) -> f64 {
 struct Terms {
     /// x / 2, above 0.
     half: f64,
-    /// The probability for the present degrees of freedom.
+    /// The probability that a variable with the present degrees of freedom is above x.
     survival: f64,
     /// Half of the present degrees of freedom.
     shape: f64,

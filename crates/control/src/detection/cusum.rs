@@ -17,7 +17,7 @@ const BISECTIONS: usize = 60;
 const LARGE: f64 = 40.0;
 /// A test with a threshold above [`LARGE`] is computed as a test of grouped samples with about this threshold.
 const REDUCED: f64 = 20.0;
-/// The largest threshold that is tried.
+/// The largest threshold that the search for a threshold tries.
 const LARGEST: f64 = 1e6;
 /// Twice the mean overshoot of a random walk with standard normal steps over a distant threshold: Siegmund (1985),
 /// (10.37).

@@ -24,8 +24,8 @@ impl Delay {
         (*last <= 1e-3).then(|| self.missed.iter().sum())
     }
 
-    /// The number of samples within which the part `probability` of the faults is detected; None if no computed number
-    /// is enough.
+    /// The number of samples within which the fraction `probability` of the faults is detected; None if no computed
+    /// number is enough.
     #[must_use]
     pub fn quantile(&self, probability: f64) -> Option<usize> {
         self.missed.iter().position(|missed| 1.0 - missed >= probability)

@@ -22,11 +22,11 @@ const PHASES: usize = 32;
 /// Abrupt Changes (1993), section 4.2.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WindowTest {
-    /// m, the number of residuals.
+    /// m, the number of residuals in the mean.
     pub residuals: u32,
     /// N, the number of samples of a window.
     pub window: usize,
-    /// h.
+    /// The threshold h of the statistic.
     pub threshold: f64,
 }
 

@@ -17,7 +17,7 @@ const LARGE: f64 = 1e100;
 /// Source: controller Hessenberg form, C. C. Paige, Properties of numerical algorithms related to
 /// computing controllability, IEEE Trans. Autom. Control 26 (1981).
 pub(super) struct ReducedPencil {
-    /// [B, A], n x (m + n).
+    /// The matrix [B, A], n x (m + n).
     both: ComplexMatrix,
     inputs: usize,
 }

@@ -171,7 +171,7 @@ fn sweep(h: &mut DMatrix<f64>, first: usize, last: usize, shift: &Shift) {
 struct Reflection {
     v: [f64; 2],
     weights: [f64; 3],
-    /// The first component of the image.
+    /// The first component of the reflected vector.
     image: f64,
 }
 

@@ -38,9 +38,9 @@ pub struct DirectForm {
     /// The invariant zeros of (A, `F_a`, C).
     pub zeros: Vec<Complex<f64>>,
     m_2: DMatrix<f64>,
-    /// [`M_1` C; N], n x n.
+    /// T = [`M_1` C; N], n x n, from x to the coordinates [`y_1`; w].
     to: DMatrix<f64>,
-    /// The inverse of `to`: [`F_a`, (I - `F_a` `M_1` C) N'].
+    /// T^-1 = [`F_a`, (I - `F_a` `M_1` C) N'].
     from: DMatrix<f64>,
     /// A in the coordinates [`y_1`; w].
     a: DMatrix<f64>,
@@ -86,7 +86,7 @@ impl DirectForm {
         if unstable.is_empty() { Ok(form) } else { Err(Error::UnstableZeros { zeros: unstable }) }
     }
 
-    /// `A_22`, (n - q) x (n - q).
+    /// `A_22`, (n - q) x (n - q): the dynamics of w without `y_1`.
     fn rest(&self) -> DMatrix<f64> {
         let (n, q) = (self.a.nrows(), self.m_1.nrows());
         self.a.view((q, q), (n - q, n - q)).into()

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 /// The parameters of [`fast_adaptive`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct FastAdaptive {
-    /// sigma in 1/s.
+    /// The design parameter sigma in 1/s.
     pub sigma: f64,
     /// The diagonal of Gamma in 1/s: for each fault, the rate at which the estimate follows the fault.
     pub gamma: Vec<f64>,

@@ -15,7 +15,7 @@ const SMALLEST: f64 = 1e-3;
 pub struct MeasuredStates {
     /// T, n x n: the new states are z = T x, with C T^-1 = [I, 0].
     pub change: DMatrix<f64>,
-    /// T^-1.
+    /// The inverse T^-1.
     pub inverse: DMatrix<f64>,
     /// The measurements, from 0, whose rates without the commands, `C[i] A x`, are the further states.
     pub rates: Vec<usize>,

@@ -20,11 +20,11 @@ pub struct IdentifiedModel {
     pub c: DMatrix<f64>,
     /// D, p x m.
     pub d: DMatrix<f64>,
-    /// K, n x p; zero if the samples have no noise.
+    /// The gain K of the innovation, n x p; zero if the samples have no noise.
     pub k: DMatrix<f64>,
-    /// b, n.
+    /// The constant b of the states, n.
     pub state_constant: DVector<f64>,
-    /// d, p.
+    /// The constant d of the outputs, p.
     pub output_constant: DVector<f64>,
     /// T, n x s (m + p): the estimate of `x[k]` is T [`z[k-s]`; ...; `z[k-1]`], z = [u; y].
     pub past: DMatrix<f64>,

@@ -59,14 +59,14 @@ impl Record {
 /// R' R has all sums of products for least squares. R is c x c, c = 1 + (s + 1) (m + p), for any number of samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Windows {
-    /// s.
+    /// s, the number of past samples in a window.
     pub(super) past: usize,
-    /// m.
+    /// m, the number of inputs.
     pub(super) inputs: usize,
-    /// p.
+    /// p, the number of outputs.
     pub(super) outputs: usize,
     pub(super) count: usize,
-    /// R.
+    /// The triangular factor R.
     pub(super) factor: DMatrix<f64>,
 }
 
@@ -160,12 +160,12 @@ impl Windows {
         Ok(svd.rank_above(tolerance * largest))
     }
 
-    /// m + p.
+    /// The number m + p of signals in a sample.
     pub(super) fn signals(&self) -> usize {
         self.inputs + self.outputs
     }
 
-    /// The columns of `z[k-s]` to `z[k-1]`.
+    /// The columns of R for `z[k-s]` to `z[k-1]`.
     pub(super) fn past_columns(&self) -> Range<usize> {
         1..1 + self.past * self.signals()
     }

@@ -20,7 +20,7 @@ pub(super) struct DecoupledPart {
     pub(super) h: DMatrix<f64>,
     /// For each fault, the length of its column of [`B_f`; `D_f`] relative to the length of its column of the plant.
     pub(super) effects: Vec<f64>,
-    /// The singular values closest to the tolerance.
+    /// The relative singular values closest to the tolerance.
     pub(super) gap: Gap,
     /// The number of states that y determines, the number of further states that y' determines, and so on: the
     /// conjugate partition of the observability indices.
@@ -30,9 +30,9 @@ pub(super) struct DecoupledPart {
 /// The relative singular values closest to the tolerance on both sides, over all rank decisions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gap {
-    /// The smallest that counted as nonzero.
+    /// The smallest relative singular value that counted as nonzero.
     pub(super) above: f64,
-    /// The largest that counted as zero.
+    /// The largest relative singular value that counted as zero.
     pub(super) below: f64,
 }
 

@@ -21,11 +21,11 @@ const NOISE_DECADES: f64 = 4.0;
 ///
 /// Row r of each matrix belongs to member r of the basis.
 pub(super) struct Family {
-    /// `t_1`, ..., `t_k`, each with one row of n entries per member.
+    /// `t_1`, ..., `t_k`, the weights of the plant's states; each with one row of n entries per member.
     pub(super) t: Vec<DMatrix<f64>>,
-    /// `L_1`, ..., `L_k`, each with one row of q entries per member.
+    /// `L_1`, ..., `L_k`, the gains from the outputs; each with one row of q entries per member.
     pub(super) l: Vec<DMatrix<f64>>,
-    /// w, one row of q entries per member.
+    /// The direct gain w, one row of q entries per member.
     pub(super) w: DMatrix<f64>,
     pub(super) poles: Vec<f64>,
     pub(super) domain: Domain,

@@ -60,7 +60,7 @@ impl DisturbedPlant {
         self.domain.check()
     }
 
-    /// `B_d` and `D_d`, extended by the columns of `B_f` and `D_f` with `decoupled[fault]`.
+    /// `B_d` and `D_d`, extended by the columns of `B_f` and `D_f` for the faults to decouple.
     pub(super) fn unknown_inputs(&self, decoupled: &[bool]) -> (DMatrix<f64>, DMatrix<f64>) {
         let faults: Vec<usize> = (0..decoupled.len()).filter(|&j| decoupled[j]).collect();
         let with_faults =

@@ -46,7 +46,7 @@ impl Affine {
         self.map(DMatrix::transpose)
     }
 
-    /// X + X'.
+    /// The matrix plus its transpose, X + X'.
     #[must_use]
     pub fn plus_transpose(&self) -> Self {
         self.map(|m| m + m.transpose())

@@ -20,9 +20,9 @@ const STRETCH: f64 = 1e11;
 
 /// Coordinates x~ = T x and a unit of frequency: x' = A x becomes x~' = unit A~ x~ with A~ of about one.
 pub(super) struct Coordinates {
-    /// T.
+    /// T, from x to x~.
     to: DMatrix<f64>,
-    /// T^-1.
+    /// T^-1, from x~ to x.
     from: DMatrix<f64>,
     pub(super) unit: f64,
 }
@@ -129,32 +129,32 @@ impl Coordinates {
         Self { to: divide_columns(root, scale), from: multiply_rows(inverse, scale), unit }
     }
 
-    /// A~ = T A T^-1 / unit.
+    /// A in the coordinates x~: T A T^-1 / unit.
     pub(super) fn dynamics(&self, a: &DMatrix<f64>) -> DMatrix<f64> {
         self.input(&(a * &self.from))
     }
 
-    /// B~ = T B / unit.
+    /// B in the coordinates x~: T B / unit.
     pub(super) fn input(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
         &self.to * b / self.unit
     }
 
-    /// C~ = C T^-1.
+    /// C in the coordinates x~: C T^-1.
     pub(super) fn output(&self, c: &DMatrix<f64>) -> DMatrix<f64> {
         c * &self.from
     }
 
-    /// P = T' P~ T.
+    /// P in the coordinates of the data: T' P~ T.
     pub(super) fn certificate(&self, p: &DMatrix<f64>) -> DMatrix<f64> {
         symmetric_part(&(self.to.transpose() * p * &self.to))
     }
 
-    /// Q = T^-1 Q~ T'^-1.
+    /// Q in the coordinates of the data: T^-1 Q~ T'^-1.
     pub(super) fn shape(&self, q: &DMatrix<f64>) -> DMatrix<f64> {
         symmetric_part(&(&self.from * q * self.from.transpose()))
     }
 
-    /// L = T^-1 L~ unit for the error dynamics A - L C.
+    /// L in the coordinates of the data, T^-1 L~ unit, for the error dynamics A - L C.
     pub(super) fn gain(&self, l: &DMatrix<f64>) -> DMatrix<f64> {
         &self.from * l * self.unit
     }

@@ -137,7 +137,7 @@ pub(super) struct GainScaling {
 }
 
 impl GainScaling {
-    /// Units from B and C in the solver's coordinates.
+    /// The units for `norm`, from B and C in the solver's coordinates.
     pub(super) fn new(norm: Norm, b: &DMatrix<f64>, c: &DMatrix<f64>, unit: f64) -> Self {
         Self { norm, disturbance: unit_near(b.norm()), output: unit_near(c.norm()), unit }
     }

@@ -105,11 +105,11 @@ pub fn feedback_norm_lower_bound(
 struct HiddenDisturbance {
     a: DMatrix<f64>,
     b: DMatrix<f64>,
-    /// W.
+    /// W of |w|^2 = |W x|^2 + |d|^2.
     energy: DMatrix<f64>,
-    /// E.
+    /// E of z = E x.
     output: DMatrix<f64>,
-    /// Lower triangular R: x = R x~ in coordinates of about one.
+    /// The lower triangular R of coordinates x~ of about one: x = R x~.
     scale: DMatrix<f64>,
     domain: Domain,
 }
@@ -198,7 +198,7 @@ impl HiddenDisturbance {
         Ok(Some((covariance.dot(&of_z) / covariance.dot(&of_w)).sqrt()))
     }
 
-    /// [A, B].
+    /// The next state or the derivative of the state, as [A, B] times [x; d].
     fn next(&self) -> DMatrix<f64> {
         grid(&[&[&self.a, &self.b]])
     }

@@ -144,9 +144,9 @@ fn largest_ratio(nulling: &Nulling, unstable: &InvariantSubspace) -> Result<Opti
 
 /// An invariant subspace of A: A U = U S.
 struct InvariantSubspace {
-    /// U, orthonormal columns.
+    /// U with orthonormal columns, a basis of the subspace.
     basis: DMatrix<f64>,
-    /// S.
+    /// S, the dynamics in the subspace.
     dynamics: DMatrix<f64>,
 }
 

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// The bound for which a gain is designed, relative to the smallest bound.
 const RELAXED_BOUND: f64 = 1.05;
-/// The bound of norm(P L) within which a gain is designed, relative to the smallest one.
+/// The bound of norm(P L) for which a gain is designed, relative to the smallest bound.
 pub(super) const RELAXED_GAIN: f64 = 2.0;
 /// How often the coordinates are refined before a search ends without an answer.
 pub(super) const REFINEMENTS: usize = 3;
@@ -43,9 +43,9 @@ impl Candidate {
 /// system {A - L C, B - L `D_y`, E, 0} of `performance`.
 #[derive(Clone, Copy)]
 pub(super) struct ObserverRequirements<'a> {
-    /// n x n.
+    /// A of the plant, n x n.
     pub(super) a: &'a DMatrix<f64>,
-    /// p x n.
+    /// C of the plant, p x n.
     pub(super) c: &'a DMatrix<f64>,
     pub(super) region: Region,
     pub(super) performance: Option<&'a Performance>,
@@ -58,9 +58,9 @@ pub(super) struct ObserverRequirements<'a> {
 /// the norm is block diagonal.
 #[derive(Clone, Copy)]
 pub(super) struct WeightedDynamics<'a> {
-    /// (n + m) x (n + m).
+    /// A of plant and weights, (n + m) x (n + m).
     pub(super) a: &'a DMatrix<f64>,
-    /// p x (n + m).
+    /// C of plant and weights, p x (n + m).
     pub(super) c: &'a DMatrix<f64>,
     /// Number of states of the weights of the disturbance, the first of the m states.
     pub(super) disturbance_states: usize,

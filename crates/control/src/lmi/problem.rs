@@ -56,7 +56,7 @@ pub struct Problem {
 
 #[derive(Debug, Clone)]
 struct Requirement {
-    /// None for a constraint that is never part of a conflict.
+    /// The name by which a conflict reports the constraint; None for a constraint that is never part of a conflict.
     name: Option<&'static str>,
     matrix: Affine,
     margin: f64,

@@ -118,7 +118,7 @@ struct Search<'a> {
     /// The mean of `matrices`.
     mean: DMatrix<f64>,
     outputs: &'a DMatrix<f64>,
-    /// In the units of the data.
+    /// The inequality in the units of the data.
     inequality: Reachability,
 }
 
@@ -184,7 +184,7 @@ impl Reachability {
         equation.solve(&shifted.transpose(), &spread).map(Some)
     }
 
-    /// r = 1 - exp(-lambda period); in continuous time lambda.
+    /// The factor r of the inequality: 1 - exp(-lambda period), in continuous time lambda.
     fn part(&self) -> f64 {
         match self.domain {
             Domain::Continuous => self.rate,
@@ -192,7 +192,7 @@ impl Reachability {
         }
     }
 
-    /// The matrix of the inequality.
+    /// The matrix of the inequality, which must be positive definite.
     fn matrix(&self, q: &Affine, a: &DMatrix<f64>) -> Affine {
         let product = a * q;
         let part = self.part();

@@ -6,7 +6,7 @@ use crate::check::as_number;
 use crate::weight::Weight;
 use crate::{Error, check};
 
-/// Points from one frequency of the table to the next, the first frequency included.
+/// Points between successive frequencies of the table, including the first frequency.
 const BETWEEN: usize = 6;
 /// The search ends when ln alpha is known to this fraction of its value for a constant weight.
 const NARROW: f64 = 1e-3;

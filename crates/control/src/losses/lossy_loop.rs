@@ -33,9 +33,9 @@ const DIRECTIONS: usize = 70;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossyLoop {
-    /// A(0).
+    /// A(0), the dynamics of the loop without losses.
     pub intact: DMatrix<f64>,
-    /// `D_j`, one for each input.
+    /// `D_j` for each input: the change of A(E) by a full loss of the input.
     pub effects: Vec<DMatrix<f64>>,
     /// Continuous or sampled time. In sampled time a loss changes at samples only.
     pub domain: Domain,
@@ -165,7 +165,7 @@ impl LossyLoop {
         Ok(good)
     }
 
-    /// [`instability`] of A(E).
+    /// The [`instability`] of A(E) at the losses E = `loss`.
     pub(super) fn instability(&self, loss: &[f64]) -> Result<f64, Error> {
         instability(&self.at(loss), self.domain)
     }

@@ -132,7 +132,7 @@ fn widest(space: &AssignableSubspace, normals: &DMatrix<f64>) -> Result<DVector<
 /// The value of a function of directions, and its gradients with respect to the eigenvectors V and the responses G.
 pub(crate) struct Slope {
     pub(crate) value: f64,
-    /// With respect to the eigenvectors V.
+    /// The gradient with respect to the eigenvectors V.
     pub(crate) of_v: DMatrix<f64>,
     /// The gradient with respect to the responses G, r rows; None if the function does not depend on G.
     pub(crate) of_g: Option<DMatrix<f64>>,

@@ -126,7 +126,7 @@ impl Iteration {
         Reflections::new(others).last_columns(columns.len())
     }
 
-    /// The basis of the subspace of a real eigenvalue.
+    /// The basis of the subspace of a real eigenvalue; `column`: the column of the eigenvector.
     fn kernel(&self, column: usize) -> DMatrix<f64> {
         self.kernels[column].map(|entry| entry.re)
     }

@@ -19,7 +19,7 @@ const SCALING_PASSES: usize = 20;
 /// and the columns of G are Y w for a direction w. B has r independent columns; w has r entries for
 /// each column of V.
 pub(crate) struct AssignableSubspaces {
-    /// One for each eigenvalue or pair.
+    /// One subspace for each eigenvalue or pair.
     pub(crate) spaces: Vec<AssignableSubspace>,
     /// Units of the states that give eigenvectors entries of similar size; powers of two.
     pub(crate) scale: DVector<f64>,

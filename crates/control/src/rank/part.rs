@@ -14,9 +14,9 @@ use nalgebra::DMatrix;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ControllablePart {
-    /// `A_1`, r x r with r the rank of the controllability matrix.
+    /// `A_1`, r x r: the dynamics of the controllable part, with r the rank of the controllability matrix.
     pub a: DMatrix<f64>,
-    /// `B_1`, r x m.
+    /// `B_1`, r x m: the effect of the inputs on the controllable part.
     pub b: DMatrix<f64>,
     /// T, r x n.
     pub coordinates: DMatrix<f64>,

@@ -103,7 +103,7 @@ impl Intervals {
         Ok(Self { starts, outputs, shortest, powers: vec![Rc::new(phi)] })
     }
 
-    /// The shortest length for one output.
+    /// The shortest interval for one output.
     pub(super) fn first(&self, output: usize) -> Length {
         self.shortest.length(&self.powers[0], &self.outputs.rows(output, 1).into())
     }
@@ -156,7 +156,7 @@ impl Shortest {
         Ok((exponential(&a)?, Self { time, continuous: Some(a) }))
     }
 
-    /// The shortest length for the output `row`.
+    /// The shortest interval for the output `row`.
     fn length(&self, phi: &Rc<DMatrix<f64>>, row: &DMatrix<f64>) -> Length {
         let (time, phi) = (self.time, Rc::clone(phi));
         let Some(a) = &self.continuous else {

@@ -32,7 +32,7 @@ pub(crate) struct KnownResponse {
     /// The eigenvalues of A.
     pub(crate) modes: Vec<Complex<f64>>,
     transfer: Transfer,
-    /// C (s I - A)^-1 B by the bits of the frequency.
+    /// Known values of C (s I - A)^-1 B; the key is the bit pattern of the frequency.
     known: HashMap<u64, DMatrix<Complex<f64>>>,
 }
 

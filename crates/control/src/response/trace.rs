@@ -14,7 +14,7 @@ const STEPS: [f64; 2] = [10.0, 4.0];
 /// The largest number of points of a response, and the number reserved for each mode that has not been followed yet.
 const MOST_POINTS: f64 = 200_000.0;
 const RESERVED: f64 = 500.0;
-/// From this order on the outputs of all times are computed together, at fewer points.
+/// From this order on, the outputs at all times are computed together and at fewer points.
 const LARGE: usize = 48;
 
 /// The outputs of a system over time.
@@ -232,7 +232,7 @@ impl Modes {
         segments
     }
 
-    /// Adds `count` steps that take `time`; in sampled time of whole samples, the last one shorter.
+    /// Adds `count` steps that take `time` together; in sampled time steps of whole samples, with a shorter last step.
     fn push(&self, list: &mut Vec<Segment>, time: f64, count: f64, is_coarse: bool) {
         if self.period == 0.0 {
             list.push(Segment { step: time / count, count: as_count(count), is_coarse });

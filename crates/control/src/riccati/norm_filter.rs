@@ -59,18 +59,18 @@ pub struct NormFilterProblem<'a> {
 /// estimation in Krein spaces, part II, IEEE Trans. Autom. Control 41 (1996), theorem 4 (a priori filter).
 #[derive(Debug, Clone)]
 pub struct NormFilter {
-    /// `A_s`.
+    /// `A_s` = A - S R^-1 C, the dynamics after the noises are decorrelated.
     a: DMatrix<f64>,
     c: DMatrix<f64>,
-    /// Q.
+    /// Q, the covariance of the disturbance that is not correlated with the measurement noise.
     process: DMatrix<f64>,
-    /// R.
+    /// R = D D', the covariance of the measurement noise.
     noise: DMatrix<f64>,
-    /// E.
+    /// E, the output matrix of the estimated signal.
     output: DMatrix<f64>,
-    /// C' R^-1 C.
+    /// C' R^-1 C, the information of the measurements.
     measured: DMatrix<f64>,
-    /// S R^-1.
+    /// S R^-1, with S = B D' the correlation of disturbance and measurement noise.
     correlated: DMatrix<f64>,
     domain: Domain,
     /// The Kalman filter for `A_s`, C, Q and R.
@@ -144,7 +144,7 @@ impl NormFilter {
         Ok(self.iterate(gamma))
     }
 
-    /// G.
+    /// The matrix G, the information of the measurements less the information of the bound.
     fn information(&self, gamma: f64) -> DMatrix<f64> {
         let output = &self.output / gamma;
         symmetric_part(&(&self.measured - output.tr_mul(&output)))

@@ -26,7 +26,7 @@ pub(super) struct ScaledProblem {
     pub(super) decoupled_q: DMatrix<f64>,
     /// Diagonal of S, powers of two.
     scale: DVector<f64>,
-    /// L.
+    /// L, the Cholesky factor of the weight R.
     factor: DMatrix<f64>,
 }
 

@@ -57,7 +57,7 @@ pub fn channel_margins(closed: &Loop, at: Point, channel: usize) -> Result<Chann
     margins_of(&KnownResponse::new(closed.complementary(at).path(channel, channel))?)
 }
 
-/// The margins of the channel with this T.
+/// The margins of the channel whose T is `complementary`.
 pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins, Error> {
     let sweep = Sweep::of_loop(complementary)?;
     let transfer = |t: &DMatrix<Complex<f64>>| loop_transfer(t[(0, 0)]);

@@ -46,7 +46,7 @@ pub fn delay_margin(closed: &Loop) -> Result<f64, Error> {
     delay_of(&KnownResponse::new(closed.complementary(Point::Input))?)
 }
 
-/// The delay margin of the loop with this T.
+/// The delay margin of the loop whose T is `complementary`.
 pub(super) fn delay_of(complementary: &KnownResponse) -> Result<f64, Error> {
     let sweep = Sweep::of_loop(complementary)?;
     let all = sweep.values.iter().map(loci).collect::<Result<Vec<_>, _>>()?;
@@ -68,10 +68,10 @@ pub(super) fn delay_of(complementary: &KnownResponse) -> Result<f64, Error> {
     Ok(delay)
 }
 
-/// An eigenvalue of L.
+/// An eigenvalue of L at a frequency.
 struct Locus {
     value: Complex<f64>,
-    /// The modulus less 1; infinite for a pole of L at this frequency.
+    /// The modulus less 1; infinite for a pole of L.
     excess: f64,
 }
 

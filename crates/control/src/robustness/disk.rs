@@ -95,7 +95,7 @@ pub fn disk_margin(closed: &Loop, at: Point, channel: Option<usize>) -> Result<D
     margin_of(KnownResponse::new(system)?)
 }
 
-/// The disk margin of the channels with this S: (S - T) / 2 = S - I / 2, and D of S is I.
+/// The disk margin of the channels whose S is `sensitivity`: (S - T) / 2 = S - I / 2, and D of S is I.
 pub(super) fn margin_of(sensitivity: KnownResponse) -> Result<DiskMargin, Error> {
     let half = &sensitivity.system.d * 0.5;
     let peak = peak_of(&sensitivity.with_direct(half))?;
@@ -139,11 +139,11 @@ pub(super) fn scaled_below(
     Ok(ScaledPeak { value, frequency, certified })
 }
 
-/// The largest structured singular value that was found.
+/// The largest structured singular value that was found so far.
 struct Largest {
     value: f64,
     frequency: f64,
-    /// Logarithms of the scaling there.
+    /// Logarithms of the scaling at this value.
     scaling: DVector<f64>,
 }
 

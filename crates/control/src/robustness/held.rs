@@ -5,9 +5,9 @@ use crate::hold;
 use crate::{Error, check};
 use nalgebra::DMatrix;
 
-/// From this order on the hold is computed by [`mean`].
+/// From this order on, the effect of a held input is computed by [`mean`].
 const LARGE: usize = 48;
-/// Degree of the Taylor polynomial, exact to rounding up to a norm of `REACH`.
+/// Degree of the Taylor polynomial of [`mean`], exact to rounding up to a norm of `REACH`.
 const DEGREE: u32 = 14;
 const REACH: f64 = 0.5;
 

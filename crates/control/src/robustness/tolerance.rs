@@ -94,7 +94,7 @@ fn is_signal(
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ToleranceTest {
-    /// Number of random cases.
+    /// Number of tested random cases.
     pub cases: u32,
     /// Number of stable random cases.
     pub stable: u32,
@@ -102,7 +102,7 @@ pub struct ToleranceTest {
     pub worst_instability: f64,
     /// The worst plant that was found.
     pub worst: StateSpace,
-    /// The deviations of the worst plant, as parts of the tolerances.
+    /// The deviations of the worst plant, as fractions of the tolerances.
     pub deviations: Vec<f64>,
     /// The multiple of the tolerances, in the direction of the worst plant, below which the loop is stable; None if the
     /// loop is stable at all [`PlantFamily::multiples`].

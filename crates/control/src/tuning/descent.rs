@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 /// Largest numbers of steps between two verifications, and of verifications.
 const STEPS: usize = 150;
 const ROUNDS: usize = 12;
-/// The values that a step uses: from this part of the largest value on, and at most this number.
+/// A step uses only the values above this fraction of the largest value, and at most [`MOST_ACTIVE`] values.
 const ACTIVE: f64 = 0.85;
 const MOST_ACTIVE: usize = 40;
 /// Step of the differences, relative to the size of a parameter.
@@ -17,7 +17,7 @@ const DIFFERENCE: f64 = 1e-3;
 /// The largest number of step lengths that are tried, and the part of the predicted decrease that a step must reach.
 const HALVINGS: usize = 14;
 const SUFFICIENT: f64 = 1e-2;
-/// A search ends at the second step that decreases gamma by less than this fraction.
+/// A search ends when two steps have decreased gamma by less than this fraction.
 const FLAT: f64 = 1e-5;
 /// A round that decreases gamma by less than this fraction is the last one if the peak is on the grid, see `BETWEEN`.
 const PROGRESS: f64 = 1e-3;
@@ -62,7 +62,7 @@ impl Tuning<'_> {
     }
 }
 
-/// The search on the frequencies of a grid.
+/// The search for parameters with the frequencies of a fixed grid.
 struct Search<'a> {
     grid: Grid<'a>,
     scales: &'a DVector<f64>,

@@ -14,11 +14,11 @@ pub(super) struct Cut {
 
 /// The minimum of the model max over i of `(f_i + g_i' d)` + d' W^-1 d / 2, W the inverse Hessian.
 pub(super) struct Direction {
-    /// d.
+    /// The direction d.
     pub(super) step: DVector<f64>,
     /// The multipliers: not negative, with the sum 1.
     pub(super) multipliers: Vec<f64>,
-    /// The largest of the values less the largest of `f_i + g_i' d`.
+    /// The predicted decrease of the maximum: the largest `f_i` less the largest `f_i + g_i' d`.
     pub(super) decrease: f64,
 }
 

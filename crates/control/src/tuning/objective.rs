@@ -37,9 +37,9 @@ pub(super) struct Place {
 
 /// K, S and H G at a frequency.
 struct ClosedLoop {
-    /// K, from the measurements.
+    /// K, the gain from the measurements to the commands.
     k: ComplexMatrix,
-    /// `K_r`, from the references.
+    /// `K_r`, the gain from the references to the commands.
     k_r: ComplexMatrix,
     /// S at the commands.
     at_input: ComplexMatrix,
@@ -169,7 +169,7 @@ impl ClosedLoop {
         Some(Self { k, k_r, at_input, at_output, h_g })
     }
 
-    /// X at the frequency.
+    /// The transfer function X at the frequency.
     fn transfer(&self, transfer: Transfer) -> ComplexMatrix {
         let complement = |s: &ComplexMatrix| ComplexMatrix::identity(s.nrows(), s.ncols()) - s;
         match transfer {

@@ -15,7 +15,7 @@ pub(crate) struct Nulling {
     pub(crate) input: DMatrix<f64>,
     /// Z, r x s.
     pub(crate) output: DMatrix<f64>,
-    /// The size of the rounding errors of S.
+    /// The size of the rounding errors of the dynamics S.
     pub(crate) rounding: f64,
 }
 

@@ -35,7 +35,7 @@ pub(super) struct Cover<'a> {
 }
 
 impl<'a> Cover<'a> {
-    /// Starts with the bound `enough` and no interval. `system`: in continuous time, stable.
+    /// Starts with the bound `enough` and no covered interval. `system` is stable and in continuous time.
     pub(super) fn new(
         system: &StateSpace,
         blocks: &'a [Block],
@@ -68,7 +68,7 @@ impl<'a> Cover<'a> {
         })
     }
 
-    /// Covers the whole axis; false if `ending` returned true before.
+    /// Covers the whole frequency axis; false if `ending` returned true before.
     pub(super) fn complete(&mut self, ending: &dyn Fn() -> bool) -> Result<bool, Error> {
         for _ in 0..ROUNDS {
             let Some(frequency) = self.next_frequency() else { return Ok(true) };

@@ -42,7 +42,7 @@ pub(super) struct HeldLoop {
     pub(super) blocks: Vec<Block>,
     /// The fraction of the tolerances up to which the error of the Gauss method is bounded.
     pub(super) fraction: f64,
-    /// Whether this error is small, relative to the effect of the tolerances.
+    /// Whether the error of the Gauss method is small, relative to the effect of the tolerances.
     pub(super) precise: bool,
 }
 

@@ -9,11 +9,11 @@ use crate::robustness::{Loop, held_plant};
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// The largest number of channels of the perturbation, and of states of the loop.
+/// The largest number of channels of the perturbation, and the largest number of states of the loop.
 const LARGEST: usize = 100;
 /// The search ends if the proven fraction reaches this multiple of the fraction for which the Gauss error was bounded.
 const NEAR: f64 = 0.97;
-/// Otherwise the Gauss error is bounded again for the proven fraction times this.
+/// The fraction for which the Gauss error is bounded next, relative to the proven fraction.
 const FURTHER: f64 = 1.02;
 const ROUNDS: usize = 4;
 
@@ -44,7 +44,7 @@ pub enum Unproven {
         channels: usize,
         /// Number of states of the loop.
         states: usize,
-        /// The largest number of each.
+        /// The largest number of channels and of states.
         most: usize,
     },
     /// The sample time is too long, compared with the time constants of the plant.

@@ -7,7 +7,8 @@ use super::hermitian::{factor, forward, largest_eigenvalue, times};
 use crate::Error;
 use crate::blocks::ComplexMatrix;
 
-/// Part of the distance from the least bound of the current scales that a step leaves, so that the scales stay inside.
+/// Fraction of the distance from the least bound of the current scales that a step leaves, so that the scales stay
+/// inside.
 const DISTANCE: f64 = 0.1;
 const STEPS: usize = 60;
 /// The search ends after a step that reduces the bound by less than this fraction.
