@@ -140,7 +140,7 @@ impl AsoController {
         }
     }
 
-    /// A, B, C and `F_a` of the design: the plant and the columns by which faults enter it.
+    /// The plant of the design: A, B, C, and `F_a`, by which faults act on the states.
     pub fn plant(&self) -> [DMatrix<f64>; 4] {
         [&self.design.a, &self.design.b, &self.design.c, &self.design.f_a].map(dense)
     }

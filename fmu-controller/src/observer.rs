@@ -28,8 +28,8 @@ pub(crate) struct Propagators {
 }
 
 impl Propagators {
-    /// The propagator for a mode and a step size in s. One that is not in the cache is computed from the matrices that
-    /// `system` returns, and replaces another one if the cache is full.
+    /// The propagator for a mode and a step size in s. A propagator that is not in the cache is computed from the
+    /// matrices that `system` returns, and replaces another one if the cache is full.
     ///
     /// Only a propagator for exactly this size is used: the content of the cache must not change results, so that a
     /// restored instance, whose cache is empty, continues with the same bits.

@@ -1,8 +1,8 @@
 //! Reconfiguration: the controller without an actuator that is gone.
 //!
-//! An actuator is gone if the input `actuator_gone` says so, or if its estimated loss of effectiveness
-//! stays above a stated fraction for a stated time; the latter is final until the next initialization.
-//! Its command is then the one at which it is stuck, `u_stuck`, also in the observer, and the others are
+//! An actuator is gone if the input `actuator_gone` says so, or if its estimated loss of effectiveness stays above a
+//! stated fraction for a stated time; the latter is final until the next initialization. The command of the actuator is
+//! then the stuck command `u_stuck`, also in the observer, and the other commands are
 //!
 //! ```text
 //! u = K_x x_hat + K_f f_hat + K_s (u_stuck - u_op)

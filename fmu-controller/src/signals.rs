@@ -121,7 +121,7 @@ impl Signals {
         change_by_operating_point([z, y, r], design, |slope, operating| *slope -= operating);
     }
 
-    /// Sets y and r to the deviations of the inputs, `offset` s after those in `values` were given.
+    /// Sets y and r to the deviations of the inputs in `values`, extrapolated by `offset` s.
     pub(crate) fn set_inputs(&mut self, values: &Values, point: &OperatingPoint, offset: f64) {
         let measured = values.y.iter().zip(&values.y_slopes).zip(&point.y);
         let referred = values.r.iter().zip(&values.r_slopes).zip(&point.r);

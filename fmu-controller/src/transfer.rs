@@ -7,13 +7,13 @@ use aso_controller::Design;
 use aso_controller::design::Actuator;
 
 /// A continuous command that is at a limit when its law changes starts beyond the limit, by this fraction of its range.
-/// So it stays at the limit, and no event indicator changes its sign at the event: FMPy's Euler method would miss the
-/// change back in the next step.
+/// So the command stays at the limit, and no event indicator changes its sign at the event: FMPy's Euler method would
+/// miss the change back in the next step.
 const BEYOND_LIMIT: f64 = 2e-9;
 
 impl Values {
-    /// If the law of `mode` is not that of the last commands, u_t becomes the distance of those from the
-    /// commands of the new law at z, y and r of `signals`, so that the commands stay where they are,
+    /// If `mode` has another law than the last commands, u_t becomes the difference of the last commands and the
+    /// commands of the new law at z, y and r of `signals`, so that the commands do not jump,
     ///
     /// ```text
     /// u_t = u before - (K_x x_hat + K_f f_hat + K_i x_i + N_r r + K_s u_stuck)

@@ -200,13 +200,13 @@ struct CarriedPlant {
     point: Vec<f64>,
     /// z at the end of a step.
     ahead: Vec<f64>,
-    /// The derivatives of `slopes`, `point` and `ahead` by the z at which the prediction starts.
+    /// The derivatives of `slopes`, `point` and `ahead` with respect to z at the start of the prediction.
     tangents: [DMatrix<f64>; 4],
     tangent: DMatrix<f64>,
     tangent_ahead: DMatrix<f64>,
-    /// The derivatives of x' and y of the plant's equations by x and the inputs.
+    /// The derivatives of x' and y of the plant's equations with respect to x and the inputs.
     jacobian: DMatrix<f64>,
-    /// The derivative of z' by z.
+    /// The derivative of z' with respect to z.
     dynamics: DMatrix<f64>,
 }
 
@@ -313,8 +313,8 @@ impl CarriedPlant {
         self.equations.jacobian(time, &z[..self.n], &self.inputs, &mut self.jacobian)
     }
 
-    /// Sets `tangents[at]`, the derivative of `slopes[at]` by the z at which the prediction starts, from `tangent`, the
-    /// derivative of `point`.
+    /// Sets `tangents[at]`, the derivative of `slopes[at]` with respect to z at the start of the prediction, from
+    /// `tangent`, the derivative of `point`.
     fn set_tangent(&mut self, at: usize, time: f64) -> Result<(), LineariseError> {
         let point = std::mem::take(&mut self.point);
         let done = self.set_jacobian(time, &point);
@@ -415,8 +415,8 @@ impl CarriedPlant {
         Ok(reached)
     }
 
-    /// Integrates z over a sample, and sets `g`, if there is one, to the derivative of the result by `z` at the start.
-    /// An error if an integration step has too many state events.
+    /// Integrates z over a sample, and sets `g`, if there is one, to the derivative of the result with respect to `z`
+    /// at the start. An error if an integration step has too many state events.
     fn integrate(
         &mut self,
         z: &mut [f64],

@@ -213,8 +213,8 @@ impl Motion {
         self.advance_until(parameters, force, start, duration, tolerance, false).map(|_| ())
     }
 
-    /// Same as [`Motion::advance`], but stops at the first stop or break-away. Returns its time in s; `None`
-    /// at the end of the interval.
+    /// Same as [`Motion::advance`], but stops at the first stop or break-away. Returns the time of this event in s;
+    /// `None` at the end of the interval.
     ///
     /// If the next interval is the rest of this one under the same constant force, the motion has the same
     /// bits as without the stop.

@@ -46,9 +46,9 @@ use nalgebra::{Complex, DMatrix};
 pub struct AsoDesign {
     /// The gains.
     pub gains: Gains,
-    /// Frobenius norm of B `K_f` + `F_a` divided by the norm of `F_a`: the part of the effect of the faults that is not
-    /// compensated. Zero up to rounding for the default `K_f` if the columns of `F_a` are in the range of B. Rows of a
-    /// measurement filter are left out; if `F_a` is zero in the other rows, this is the norm of B `K_f`.
+    /// Frobenius norm of B `K_f` + `F_a` divided by the norm of `F_a`: the fraction of the effect of the faults that is
+    /// not compensated. Zero up to rounding for the default `K_f` if the columns of `F_a` are in the range of B. Rows
+    /// of a measurement filter are left out; if `F_a` is zero in the other rows, this is the norm of B `K_f`.
     pub cancellation_residual: f64,
     /// Quality of the pole assignment for A + B `K_x`.
     pub controller: Quality,

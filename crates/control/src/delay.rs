@@ -139,8 +139,8 @@ impl Delays {
     /// ```
     ///
     /// `plant`: in continuous time, n states, m commands, p measurements; `order`: one or more. The states of the
-    /// delays, in the order of the commands and then of the measurements, follow those of the plant. Each entry of B,
-    /// C and D of `plant` is one entry of the result, see [`Delays::entry`].
+    /// delays, in the order of the commands and then of the measurements, follow the states of the plant. Each entry of
+    /// B, C and D of `plant` is one entry of the result, see [`Delays::entry`].
     ///
     /// # Errors
     ///

@@ -132,7 +132,7 @@ impl FaultyPlant {
     /// Checks that an augmented observer exists whose error decays: (`A_0`, `C_0`) is detectable.
     /// Returns the unobservable modes of (`A_0`, `C_0`), whose eigenvalues no observer moves.
     ///
-    /// The conditions are those of [`FaultyPlant::check_observer_exists`], but (A, C) need only be detectable.
+    /// The conditions are the same as in [`FaultyPlant::check_observer_exists`], but (A, C) need only be detectable.
     ///
     /// # Errors
     ///

@@ -11,8 +11,8 @@
 //! | [`sliding_mode`] | `f_hat` = rho F e / (\|F e\| + delta) | the same, rho above the fault |
 //! | [`learning`] | `f_hat` = `K_1` (`f_hat` a sample before) + `K_2` e | the same |
 //!
-//! and `x_hat`' = A `x_hat` + B u + `F_a` `f_hat` + `L_x` e. The last three are designed in the coordinates of
-//! [`DirectForm`]. Sliding mode and learning are laws of sampled controllers.
+//! and `x_hat`' = A `x_hat` + B u + `F_a` `f_hat` + `L_x` e. Fast adaptive, sliding-mode and learning laws are designed
+//! in the coordinates of [`DirectForm`]; sliding mode and learning are for sampled controllers.
 
 mod direct_form;
 mod fast_adaptive;

@@ -112,7 +112,7 @@ impl Tuning<'_> {
         Ok(largest)
     }
 
-    /// Returns A of the closed loop at `parameters`: the states of the plant, then those of the controller.
+    /// Returns A of the closed loop at `parameters`: the states of the plant, then the states of the controller.
     ///
     /// # Errors
     ///

@@ -217,11 +217,11 @@ fn test(detection: &Detection, residuals: &[Counted]) {
 
 /// Bytes of a controller without its program code.
 pub(super) struct Memory {
-    /// One instance.
+    /// Bytes of one instance.
     pub(super) state: usize,
-    /// The vectors on the stack during a sample.
+    /// Bytes of the vectors on the stack during a sample.
     pub(super) stack: usize,
-    /// The constants.
+    /// Bytes of the constants.
     pub(super) constants: usize,
 }
 

@@ -20,7 +20,7 @@ pub(super) struct Detection {
     pub(super) c: DMatrix<f64>,
     pub(super) d_u: DMatrix<f64>,
     pub(super) d_y: DMatrix<f64>,
-    /// The initial x_r is this matrix times the initial deviations of the states; k x n.
+    /// Maps the initial deviations of the states to the initial x_r, k x n.
     pub(super) start: DMatrix<f64>,
     /// The faults that a decision counts from 1.
     pub(super) faults: Vec<String>,

@@ -110,7 +110,7 @@ pub struct Error(String);
 
 /// Writes the controller of a sampled design as source code.
 ///
-/// In double precision its results have the bits of the controller FMU of this design.
+/// In double precision, the code gives the bits of the controller FMU of this design.
 ///
 /// # Errors
 ///

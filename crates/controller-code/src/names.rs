@@ -29,7 +29,7 @@ const LONGEST_PREFIX: usize = 23;
 const LONGEST_FIELD: usize = 40;
 
 /// Returns the start of the names of files, types and functions for the plant `name`: an identifier of C and Rust with
-/// at most 23 characters. It is no reserved word; without letters and digits in `name` it is `controller`.
+/// at most 23 characters. The result is no reserved word; without letters and digits in `name` it is `controller`.
 #[must_use]
 pub fn prefix(name: &str) -> String {
     let mut prefix = plain(name, LONGEST_PREFIX);

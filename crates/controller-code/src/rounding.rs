@@ -62,7 +62,8 @@ const UNPROVEN: &str = "at worst, the errors of all signals are larger than the 
 
 /// The bound, or the reason why there is none.
 pub(super) struct RoundingBound {
-    /// Outputs (commands, faults, residuals) x signals (as [`Kind::ALL`], then 1).
+    /// The bound: rows are commands, faults and residuals, columns are signals in the order of [`Kind::ALL`], then 1.
+    /// If there is none, the reason.
     bound: Result<DMatrix<f64>, String>,
     /// 1 - |lambda| for the slowest eigenvalue lambda of the loop; NaN if this eigenvalue is not known.
     slowest: f64,

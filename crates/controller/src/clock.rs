@@ -59,7 +59,7 @@ impl Clock {
         self.start + (self.next - 1.0) * self.period
     }
 
-    /// Returns the next instant in s, at most `end`; `None` if it is after `end`.
+    /// Returns the next instant in s if it is at most `end`; otherwise `None`.
     #[must_use]
     pub fn next_until(&self, end: f64) -> Option<f64> {
         let next = self.next_instant();
@@ -67,7 +67,7 @@ impl Clock {
         (next <= end + tolerance).then_some(next.min(end))
     }
 
-    /// Returns the time in s from `time` to the next instant, negative if it was before.
+    /// Returns the time in s from `time` to the next instant, negative if the instant was before.
     #[must_use]
     pub fn time_to_next(&self, time: f64) -> f64 {
         self.next * self.period - (time - self.start)

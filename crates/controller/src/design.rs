@@ -230,7 +230,7 @@ impl Design {
     }
 
     /// The gains without the actuators whose bits are set in `gone`, bit j for actuator j; `None` if the design has no
-    /// gains without exactly these.
+    /// gains for exactly these actuators.
     pub fn gains_without(&self, gone: u64) -> Option<GainSet<'_>> {
         if gone.is_power_of_two() {
             let case = self.without(gone.trailing_zeros() as usize)?;
@@ -245,8 +245,8 @@ impl Design {
         self.reconfigurations.iter().find(|case| case.actuator == j)
     }
 
-    /// Sets the gains of reconfigurations, combinations and fall-back to zero. In a direction of differentiation they
-    /// are zero, because they are no variables of the FMU.
+    /// Sets the gains of reconfigurations, combinations and fall-back to zero, as in a direction of differentiation:
+    /// these gains are no variables of the FMU.
     pub fn clear_reconfigurations(&mut self) {
         for case in &mut self.reconfigurations {
             case.k_x.iter_mut().chain(&mut case.k_f).for_each(Matrix::clear);
@@ -273,7 +273,7 @@ impl Design {
         self.measurements.iter().any(|signal| signal.longest_hold.is_some())
     }
 
-    /// Whether other gains than those of the intact plant may be in force.
+    /// Whether gains other than the gains of the intact plant may be in force.
     #[must_use]
     pub fn is_reconfigurable(&self) -> bool {
         !self.reconfigurations.is_empty() || self.fallback.is_some()
@@ -295,7 +295,7 @@ impl Design {
         [a, b, c, f_a, k_x, k_f, l_x, l_f].into_iter().chain(stated)
     }
 
-    /// Sets A_f, H and F_i to zero. In a direction of differentiation they are zero, because they do not depend on the
+    /// Sets A_f, H and F_i to zero, as in a direction of differentiation: these matrices do not depend on the
     /// scheduling variable.
     pub fn clear_constant(&mut self) {
         [&mut self.a_f, &mut self.h, &mut self.f_i].into_iter().flatten().for_each(Matrix::clear);
@@ -361,8 +361,8 @@ impl Design {
         [x_hat, f_hat, y_f, x_i, u_t]
     }
 
-    /// The matrices with the names that they have in the file and as FMI variables; those from A_f on only where they
-    /// are stated.
+    /// The matrices with their names in the file and as FMI variables; A_f and the matrices after it only if they are
+    /// stated.
     pub fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
         named_matrices! {
             self: "A_f" a_f, "D" d, "P_f" p_f, "H" h, "K_i" k_i, "F_i" f_i, "L_w" l_w, "N_r" n_r

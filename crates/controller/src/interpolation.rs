@@ -26,7 +26,7 @@ struct Place {
 }
 
 impl Schedule {
-    /// The position of the measurement that is the scheduling variable; `None` if it is an input of its own.
+    /// The position of the measurement that is the scheduling variable; `None` if the variable is a separate input.
     #[must_use]
     pub fn measurement(&self, design: &Design) -> Option<usize> {
         design.measurements.iter().position(|signal| signal.name == self.variable)
@@ -59,9 +59,9 @@ impl Schedule {
     }
 
     /// Writes the derivatives of the interpolated matrices and operating point into `direction`, for the derivative
-    /// `slope` of the scheduling variable. They are zero outside of the grid; at a point of the grid they belong to the
-    /// interval after it, at the last point to the one before it. A_f, H and F_i, which are constant, become zero.
-    /// Returns the derivative of the value limited to the grid.
+    /// `slope` of the scheduling variable. The derivatives are zero outside of the grid; at a point of the grid they
+    /// belong to the next interval, at the last point to the last interval. A_f, H and F_i, which are constant, become
+    /// zero. Returns the derivative of the value limited to the grid.
     pub fn differentiate(&self, value: f64, slope: f64, direction: &mut Design) -> f64 {
         let Place { interval, inside, .. } = self.place(value);
         let [from, to] = [0, 1].map(|end| self.points[interval + end].at);

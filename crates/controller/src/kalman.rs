@@ -13,7 +13,7 @@ use crate::matrix::Matrix;
 pub struct KalmanDesign {
     /// What the filter is for, in one sentence.
     pub description: String,
-    /// T in s.
+    /// The sample time T in s.
     pub sample_time: f64,
     /// Number of integration steps in a sample.
     pub integration_steps: i32,
@@ -58,7 +58,7 @@ pub struct CarriedFault {
     pub rate: Option<usize>,
 }
 
-/// Where a fault enters.
+/// The signal to which a fault is added.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Entry {

@@ -35,7 +35,7 @@ impl Matrix {
     /// Adds row i times `vector` to `sums[i]`, for each row. With `WHOLE` the products of a row are summed first,
     /// otherwise they are added to `sums[i]` one after the other.
     ///
-    /// For short rows a loop costs more than the products, so it is unrolled for them.
+    /// For short rows, the loop is unrolled, because it would cost more than the products.
     pub fn add_product<const WHOLE: bool>(&self, vector: &[f64], sums: &mut [f64]) {
         match self.columns {
             1 => add_rows::<1, WHOLE>(self.values.as_chunks().0, vector, sums),

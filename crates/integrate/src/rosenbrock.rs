@@ -73,7 +73,7 @@ pub(crate) struct Rosenbrock {
     argument: Vec<f64>,
     /// The right-hand side of a stage, then its increment.
     slope: Vec<f64>,
-    /// Column by column.
+    /// The Jacobian, column by column.
     jacobian: Vec<f64>,
     /// `I / (gamma size)` minus the Jacobian, column by column.
     matrix: Vec<f64>,

@@ -35,9 +35,9 @@ const STABLE_STEPS: u32 = 5;
 /// Results of the last steps on which the size and the method of the next step depend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Memory {
-    /// The proposed step in s; 0: none.
+    /// The proposed size of the next step in s; 0 without a proposal.
     size: f64,
-    /// The error of the last step; 0: none.
+    /// The error of the last step; 0 without an error.
     error: f64,
     is_stiff: bool,
     /// Number of steps of the explicit method beyond [`BORDER`] since the count was last reset.

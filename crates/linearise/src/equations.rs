@@ -62,7 +62,8 @@ struct Names {
 
 #[expect(clippy::missing_errors_doc, reason = "the type says them")]
 impl PlantEquations {
-    /// Creates the equations of `fmu` with the parameters of `request`. Ignores its `states`: x has all states.
+    /// Creates the equations of `fmu` with the parameters of `request`. Ignores the states that `request` names: x has
+    /// all states.
     ///
     /// # Errors
     ///
@@ -166,7 +167,7 @@ impl PlantEquations {
     }
 
     /// Begins a trajectory at `time` in s with the states `x` and the inputs `u`: an event makes the discrete variables
-    /// consistent with them, and may change `x`.
+    /// consistent with these values, and may change `x`.
     pub fn begin(&mut self, time: f64, x: &mut [f64], u: &[f64]) -> Result<(), LineariseError> {
         if self.can_restore {
             self.component.restore_state(0)?;

@@ -37,9 +37,9 @@ impl SizeBounds {
 /// Runge-Kutta methods"; exponents: Hairer and Wanner 1996, section IV.2.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Law {
-    /// The exponent q.
+    /// The exponent q of an error proportional to `H^q`.
     exponent: f64,
-    /// `e_before / e_0`; 1 without a previous error.
+    /// The previous error relative to the target error, `e_before / e_0`; 1 without a previous error.
     before: f64,
 }
 
@@ -247,8 +247,8 @@ impl EnergyControl {
         }
     }
 
-    /// Returns the measure e of a step from the bonds at its end, as many as nominals; 0 without bonds. Updates the
-    /// largest powers.
+    /// Returns the measure e of a step from the bonds at the end of the step, one for each nominal; 0 without bonds.
+    /// Updates the largest powers.
     pub fn measure(&mut self, bonds: &[Bond]) -> f64 {
         if bonds.is_empty() {
             return 0.0;
@@ -262,7 +262,7 @@ impl EnergyControl {
         f64::sqrt(sum / count)
     }
 
-    /// Returns the size of the next step in s from the `size` of the last one in s and the bonds at its end.
+    /// Returns the size of the next step in s from the `size` of the last step in s and the bonds at its end.
     pub fn next(&mut self, size: f64, bonds: &[Bond]) -> f64 {
         let measure = self.measure(bonds);
         self.control.next(size, measure)

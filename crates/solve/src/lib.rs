@@ -194,13 +194,13 @@ struct Convergence {
     limit: u32,
     /// The evaluations of G in this solution.
     iterations: u32,
-    /// G(u) - u.
+    /// The residual G(u) - u.
     residual: Vec<f64>,
     /// The weights of the first evaluation, kept so that residuals of one solution are comparable.
     weights: Vec<f64>,
     /// The merit of the first evaluation.
     first: f64,
-    /// `max_i |residual_i| / weights_i`.
+    /// The size of the residual, `max_i |residual_i| / weights_i`.
     merit: f64,
 }
 

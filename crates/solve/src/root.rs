@@ -23,7 +23,7 @@ pub struct Bracket {
     /// Time and value of the right end.
     right: (f64, f64),
     width: f64,
-    /// `kappa_1`.
+    /// The size `kappa_1` of the truncation.
     truncation: f64,
     /// Half the widest bracket that bisection can still narrow to `width` with the remaining values.
     radius: f64,

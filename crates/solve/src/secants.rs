@@ -23,23 +23,23 @@ pub(super) struct Secants {
     ages: Vec<u32>,
     /// The slots that are not in use.
     free: Vec<usize>,
-    /// dR, n entries for each slot.
+    /// dR, the differences of residuals, n entries for each slot.
     residuals: Vec<f64>,
-    /// dG, n entries for each slot.
+    /// dG, the differences of values, n entries for each slot.
     values: Vec<f64>,
     /// The factor Q, column by column.
     orthonormal: Vec<f64>,
     /// The triangle R, column by column, `capacity` entries for each.
     triangle: Vec<f64>,
-    /// `Q' r`, overwritten by c.
+    /// `Q' r`, overwritten by the coefficients c.
     coefficients: Vec<f64>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Evaluation {
-    /// G(u) - u.
+    /// The residual G(u) - u.
     residual: Vec<f64>,
-    /// G(u).
+    /// The value G(u).
     value: Vec<f64>,
 }
 

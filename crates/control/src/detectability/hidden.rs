@@ -76,7 +76,7 @@ fn support(v: &ComplexVector) -> Vec<usize> {
 
 /// All hidden faults of a plant: for each eigenvalue s of `A_f`, a basis of the null space of R(s).
 ///
-/// The basis is reduced so that each of its vectors has a fault that the others lack. R(s) has rows
+/// The basis is reduced so that each of its vectors has a fault that the other vectors lack. R(s) has rows
 /// and columns scaled to length one. Of two conjugate s only the one above the real axis is examined;
 /// for a complex s at most one combination is returned.
 pub(crate) fn hidden_faults(plant: &FaultyPlant) -> Result<Vec<HiddenFault>, Error> {
@@ -177,7 +177,7 @@ fn null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error> {
 }
 
 /// Pairs of fault and vector that span the same space as the columns of `faults` and `vectors`, each
-/// fault with a row in which the others are zero (Gauss-Jordan elimination with pivots in `faults`).
+/// fault with a row in which the other faults are zero (Gauss-Jordan elimination with pivots in `faults`).
 ///
 /// Columns without a fault, which are unobservable modes of (A, C), are left out.
 fn reduced_basis(

@@ -17,9 +17,9 @@ pub struct Visibility {
     /// Whether a fault that develops by its model changes the measurement at some time. For a
     /// constant fault: whether the transfer function from its column of `F_a` is not identically zero.
     pub visible: bool,
-    /// The transfer function from the column of `F_a` to the measurement at s = 0, or z = 1 in sampled
-    /// time. None if it has a pole there: the measurement then grows without bound. Zero for the rate
-    /// of a ramp, whose column of `F_a` is zero.
+    /// The transfer function from the column of `F_a` to the measurement at s = 0, or z = 1 in sampled time. None for a
+    /// pole at this point: the measurement then grows without bound. Zero for the rate of a ramp, whose column of `F_a`
+    /// is zero.
     pub dc_gain: Option<f64>,
 }
 

@@ -49,14 +49,14 @@ const LONGEST: f64 = 1e12;
 /// Analysis (1985); W. K. Grassmann, M. I. Taksar and D. P. Heyman, Operations Research 33 (1985).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cusum {
-    /// kappa, in standard deviations of the residual, above 0.
+    /// The drift kappa, in standard deviations of the residual, above 0.
     pub drift: f64,
-    /// h, in standard deviations of the residual, above 0.
+    /// The threshold h, in standard deviations of the residual, above 0.
     pub threshold: f64,
 }
 
 impl Cusum {
-    /// Returns the test with this drift whose mean number of samples between false alarms is `samples`.
+    /// Returns the test with drift `drift` and a mean of `samples` samples between false alarms.
     ///
     /// `drift`: above 0; `samples`: at least 2. With a large drift, false alarms may be rarer than required at every
     /// threshold: the threshold is then close to 0 and [`Cusum::between_false_alarms`] larger than `samples`, 1.7e6 for

@@ -66,8 +66,8 @@ impl NoisyPlant {
         check::column("a column e_s", input.on_measurements.as_slice(), self.c.nrows())
     }
 
-    /// The plant with `input` as a further state, a random walk: d' = noise of this intensity (in sampled
-    /// time `d[k+1] = d[k]` + noise of this covariance).
+    /// The plant with `input` as a further state, a random walk: d' = noise of intensity `intensity` (in sampled time
+    /// `d[k+1] = d[k]` + noise of this covariance).
     ///
     /// A filter of this plant estimates the input, so that a constant input has no effect on the residuals in steady
     /// state. A larger intensity makes the effect decay sooner. Other unknown inputs need a zero for the new state
@@ -95,7 +95,7 @@ impl NoisyPlant {
 }
 
 impl UnknownInput {
-    /// The same input, with zeros for further states up to the number `states`.
+    /// The input with zeros appended for further states, up to the number `states`.
     #[must_use]
     pub fn extended(&self, states: usize) -> Self {
         Self { on_states: self.on_states.clone().resize_vertically(states, 0.0), ..self.clone() }

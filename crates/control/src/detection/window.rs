@@ -61,7 +61,7 @@ impl WindowTest {
         as_number(self.window) / self.alarm_probability(0.0)
     }
 
-    /// The probability of an alarm in a window in which the mean of the residuals has this length.
+    /// The probability of an alarm in a window in which the mean of the residuals has the length `mean`.
     #[must_use]
     pub fn alarm_probability(&self, mean: f64) -> f64 {
         noncentral_survival(self.residuals, as_number(self.window) * mean * mean, self.threshold)

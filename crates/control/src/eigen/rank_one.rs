@@ -5,7 +5,7 @@ use crate::Error;
 use crate::balance::{Balance, divide_rows, multiply_columns};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// A + g b c with a column b, a row c and any gain g, in coordinates in which it is a Hessenberg matrix.
+/// A + g b c with a column b, a row c and any gain g, in coordinates in which the sum is a Hessenberg matrix.
 ///
 /// A is balanced; an orthogonal transformation makes b a multiple of the first axis and A a Hessenberg
 /// matrix. The feedback changes the first row only, so that each gain needs the QR algorithm alone, 6 n^3

@@ -22,10 +22,10 @@ pub struct FastAdaptive {
 /// f_hat' = Gamma F (e' + sigma e),  realised as  f_hat = f_hat_i + Gamma F e,  f_hat_i' = sigma Gamma F e
 /// ```
 ///
-/// F = `M_1` of [`DirectForm`], F C `F_a` = I. In its coordinates A - `L_x` C = [-sigma I, J; 0, ..]. The error eps =
-/// `f_hat` - f then obeys eps' = -Gamma eps + Gamma J w - f': each estimate is the fault after a first-order lag of
-/// rate gamma. The only disturbance is w, the error in the coordinates that no fault enters; no fault excites w. In
-/// sampled time (current estimator) the eigenvalues are e^(-sigma T) and e^(-gamma T).
+/// F = `M_1` of [`DirectForm`], F C `F_a` = I. In the coordinates of [`DirectForm`] A - `L_x` C = [-sigma I, J; 0, ..].
+/// The error eps = `f_hat` - f then obeys eps' = -Gamma eps + Gamma J w - f': each estimate is the fault after a
+/// first-order lag of rate gamma. The only disturbance is w, the error in the coordinates that no fault enters; no
+/// fault excites w. In sampled time (current estimator) the eigenvalues are e^(-sigma T) and e^(-gamma T).
 ///
 /// `gains`: `K_x`, `K_f` and the estimator are used; `rate`: the rate of the other errors, in 1/s, see
 /// [`DirectForm::observer_gain`], whose P proves the stability for all positive Gamma and sigma in continuous time.

@@ -16,9 +16,9 @@ use nalgebra::DMatrix;
 /// T is the matrix of the lag: if the rate of a fault is constant (for a ramp model: its second derivative), `f_hat_i`
 /// lags behind by T times this rate. For constant faults `L_f` (y - C `x_hat`) = `f_hat_i`', so that `f_hat` =
 /// `f_hat_i` + part T `f_hat_i`'. `part` = 1 removes the lag: for constant fault models a ramp leaves no lasting error.
-/// `part` = 0 gives the augmented observer. `gains`: those of the augmented observer; its error dynamics must be
-/// stable. In sampled time with a current estimator, `x_hat` in the first equation is the corrected estimate. The law
-/// exists whenever the augmented observer does.
+/// `part` = 0 gives the augmented observer. `gains`: the gains of an augmented observer with stable error dynamics. In
+/// sampled time with a current estimator, `x_hat` in the first equation is the corrected estimate. The law exists
+/// whenever the augmented observer does.
 ///
 /// In continuous time `P_f` passes measurement noise of any frequency to `f_hat`.
 ///

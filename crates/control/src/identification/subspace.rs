@@ -89,7 +89,7 @@ impl Subspace {
         &self.singular_values
     }
 
-    /// The model of this order, step 4 of [`crate::identification`]. Its states are uncorrelated; the variance of
+    /// The model of order `order`, step 4 of [`crate::identification`]. Its states are uncorrelated; the variance of
     /// each is the standard deviation of its effect on the next s measurements, in units of the signals' deviations.
     ///
     /// # Errors

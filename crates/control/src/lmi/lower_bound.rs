@@ -80,7 +80,7 @@ pub fn observer_norm_lower_bound(
     hidden.largest_ratio()
 }
 
-/// A lower bound of the H-infinity norm that holds for every state feedback, with proof: that of
+/// A lower bound of the H-infinity norm that holds for every state feedback, with proof: the result of
 /// [`observer_norm_lower_bound`] for the transposed system.
 ///
 /// `a`, `b`, `performance`: as for [`super::state_feedback`]. None in the cases of [`observer_norm_lower_bound`],

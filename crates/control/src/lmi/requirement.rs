@@ -43,7 +43,7 @@ impl Performance {
         check::positive("gamma", self.gamma.unwrap_or(1.0))
     }
 
-    /// The same requirement for the transposed system.
+    /// The requirement for the transposed system.
     #[must_use]
     pub fn transposed(&self) -> Self {
         Self {

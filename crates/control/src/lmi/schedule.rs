@@ -108,8 +108,8 @@ pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
 /// V is continuous at the grid points. Along every theta(t) its one-sided derivatives there are those of the
 /// neighbouring intervals, so V decreases there, too.
 ///
-/// The matrices are polynomials of t in each interval; all their Bernstein coefficients are definite, so the
-/// proof holds between the grid points, too. It is sufficient, not necessary.
+/// The matrices are polynomials of t in each interval; all their Bernstein coefficients are definite, so the proof
+/// holds between the grid points, too. The condition is sufficient, not necessary.
 ///
 /// Returns None if no P could be proven. The P of the solver is verified by the eigenvalues of all
 /// inequalities in the units of the data, with products that are computed in twice the precision and in
@@ -169,7 +169,7 @@ pub fn certify_schedule(
 }
 
 /// The largest change of the scheduling variable in a sample, or in continuous time its largest rate per s, that
-/// [`certify_schedule`] proves, to 20 %; None if it proves none between an upper limit and 1/4096 of it.
+/// [`certify_schedule`] proves, to 20 %; None if no change between an upper limit and 1/4096 of the limit is proven.
 ///
 /// The limit is the length of the shortest interval; in continuous time this length times the largest
 /// modulus of the eigenvalues of the coefficients: theta then passes the interval as fast as the

@@ -47,12 +47,11 @@ pub struct CommonFeedback {
 /// V(t) <= exp(-2 alpha t) V(0) for a decay rate alpha. For the disc and the sector P is a
 /// proof for each constant matrix of the hull only. One P is sufficient, not necessary.
 ///
-/// Of all P <= I the one farthest inside of all inequalities is computed, in the coordinates that
-/// suit the first vertex, then up to three times in those in which the most interior P is the
-/// identity. P is verified for each vertex in the units of the data, as in
-/// [`super::certify_region`]. [`Outcome::Infeasible`] has the indices of vertices whose
-/// eigenvalues are outside of the region, or else of vertices that have no common P, each of them
-/// necessary for the contradiction.
+/// Of all P <= I the one farthest inside of all inequalities is computed, in coordinates that suit the first vertex,
+/// then up to three times in coordinates in which the most interior P is the identity. P is verified for each vertex in
+/// the units of the data, as in [`super::certify_region`]. [`Outcome::Infeasible`] has the indices of vertices whose
+/// eigenvalues are outside of the region, or else of vertices that have no common P, each of them necessary for the
+/// contradiction.
 ///
 /// Source: S. Boyd, L. El Ghaoui, E. Feron, V. Balakrishnan, Linear matrix inequalities in system
 /// and control theory (1994), section 5.1; M. Chilali, P. Gahinet, P. Apkarian, Robust pole
@@ -190,12 +189,11 @@ fn contradiction<T>(
 /// also while they vary arbitrarily fast. A gain exists for the inequalities if and only if the
 /// program is feasible; a gain with another P for each member may exist when it is not.
 ///
-/// X >= I, and Y of a norm up to twice the smallest possible, are chosen as far inside of all
-/// inequalities as possible, in coordinates in which all states are equally controllable; up to
-/// three times more in those in which the most interior X is the identity. The region is then
-/// proven for the closed loops by [`certify_common`] with a P of its own.
-/// [`Outcome::Infeasible`] has the indices of members that have no common gain, each of them
-/// necessary for the contradiction.
+/// X >= I, and Y of a norm up to twice the smallest possible, are chosen as far inside of all inequalities as possible,
+/// in coordinates in which all states are equally controllable; up to three times more in coordinates in which the most
+/// interior X is the identity. The region is then proven for the closed loops by [`certify_common`] with a P of its
+/// own. [`Outcome::Infeasible`] has the indices of members that have no common gain, each of them necessary for the
+/// contradiction.
 ///
 /// Source: J. Bernussou, P. L. D. Peres, J. C. Geromel, A linear programming oriented procedure
 /// for quadratic stabilization of uncertain systems, Systems & Control Letters 13 (1989); Boyd et
@@ -260,8 +258,8 @@ pub fn common_feedback(
     contradiction(all, |members| search.program(&coordinates, members).problem)
 }
 
-/// The largest scaling, from 0 to 1, of a family around its first member for which
-/// [`common_feedback`] finds a gain, to 1/128; None if it finds none for the first member alone.
+/// The largest scaling, from 0 to 1, of a family around its first member for which [`common_feedback`] finds a gain, to
+/// 1/128; None if there is no gain for the first member alone.
 ///
 /// ```text
 /// A_0 + s (A_i - A_0), B_0 + s (B_i - B_0)

@@ -26,7 +26,7 @@ pub struct ChannelWeights {
 }
 
 impl ChannelWeights {
-    /// The system with weights. States: those of `system`, of `input`, of `output`.
+    /// The system with weights. States: first of `system`, then of `input`, then of `output`.
     ///
     /// # Panics
     ///
@@ -94,15 +94,14 @@ impl ChannelWeights {
     ///
     /// `performance`: as for [`super::observer_gain`], with [`super::Norm::HInfinity`].
     ///
-    /// The gain does not act on the states of the weights: the extended error dynamics have the gain
-    /// [L; 0], and the set of these gains with a norm below a bound is not convex. So descents start from up to
-    /// three gains. Linear matrix inequalities give one for the region alone and one for region and norm (with P =
-    /// diag(`P_1`, `P_2`), Z = `P_1` L makes the inequalities of the norm linear). The third is the Kalman gain
-    /// for disturbances of unit intensity, without its rows for the states of the weights. Each descent lowers
-    /// the norm within the region as far as possible, by its derivatives with respect to the entries of L.
-    /// Of the results with a norm up to 5 % above the least one, or below a given bound, the one with the
-    /// smallest Frobenius norm of L is chosen. It is a local minimum;
-    /// [`super::observer_norm_lower_bound`] for [`Self::extend`] bounds the norm of the best observer.
+    /// The gain does not act on the states of the weights: the extended error dynamics have the gain [L; 0], and the
+    /// set of these gains with a norm below a bound is not convex. So descents start from up to three gains. Linear
+    /// matrix inequalities give one for the region alone and one for region and norm (with P = diag(`P_1`, `P_2`), Z =
+    /// `P_1` L makes the inequalities of the norm linear). The third is the Kalman gain for disturbances of unit
+    /// intensity, without its rows for the states of the weights. Each descent lowers the norm within the region as far
+    /// as possible, by its derivatives with respect to the entries of L. Of the results with a norm up to 5 % above the
+    /// least one, or below a given bound, the one with the smallest Frobenius norm of L is chosen. The result is a
+    /// local minimum; [`super::observer_norm_lower_bound`] for [`Self::extend`] bounds the norm of the best observer.
     /// [`Outcome::Inconclusive`] if no result keeps the given bound.
     ///
     /// The region is proven as in [`super::observer_gain`]. `bound` of the result is the bound of the weighted
@@ -172,9 +171,9 @@ impl ChannelWeights {
         Ok(Outcome::Optimal(Synthesis { bound, ..synthesis }))
     }
 
-    /// A state feedback as by [`super::state_feedback`], for an H-infinity norm with weights; u = K x does not
-    /// depend on the states of the weights. It is the transposed [`Self::observer_gain`] of the transposed
-    /// system; `bound` and `region` are certificates of the transposed loop.
+    /// A state feedback as by [`super::state_feedback`], for an H-infinity norm with weights; u = K x does not depend
+    /// on the states of the weights. K is the transposed [`Self::observer_gain`] of the transposed system; `bound` and
+    /// `region` are certificates of the transposed loop.
     ///
     /// # Errors
     ///

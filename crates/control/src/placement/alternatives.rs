@@ -26,13 +26,13 @@ pub struct Alternatives {
 }
 
 impl Alternatives {
-    /// The chosen one, then the others.
+    /// The chosen placement, then the others.
     pub fn all(&self) -> impl Iterator<Item = &Placement> {
         std::iter::once(&self.chosen).chain(&self.others)
     }
 
-    /// The candidates for a pair of feedback and observer: first the chosen one and the others, second the results
-    /// of the standard methods that differ from the chosen one.
+    /// The candidates for a pair of feedback and observer: first the chosen placement and `others`, second the results
+    /// of the standard methods that differ from the chosen placement.
     ///
     /// Both lists have only placements whose condition number and gain are at most 9 % above the lower ones of the
     /// standard methods, if these have results. If only the first list is empty, the second one takes its
@@ -59,8 +59,8 @@ impl Alternatives {
         }
     }
 
-    /// The pairs of the results of the same standard method for `self` and `other`; a method without a result for one
-    /// of them has no pair. See [`Self::standard`].
+    /// For each standard method, the pair of its results for `self` and `other`; no pair if one of the results is
+    /// missing. See [`Self::standard`].
     pub fn standard_pairs<'a>(
         &'a self,
         other: &'a Self,
@@ -69,7 +69,7 @@ impl Alternatives {
         pairs.filter_map(|(feedback, observer)| feedback.as_ref().zip(observer.as_ref()))
     }
 
-    /// Replaces each gain by `map` of it.
+    /// Replaces each gain K by `map`(K).
     #[must_use]
     pub fn map(mut self, map: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
         let Self { chosen, others, standard } = &mut self;

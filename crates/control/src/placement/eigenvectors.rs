@@ -76,7 +76,7 @@ fn start_directions(problem: &AssignableSubspaces, start: usize) -> Directions {
     problem.spaces.iter().map(&mut direction).collect()
 }
 
-/// Replaces each eigenvector, or pair, in turn by the one that spans the largest volume with the
+/// Replaces each eigenvector, or pair, in turn by the eigenvector, or pair, that spans the largest volume with the
 /// others, in 20 sweeps from a start; ends early if the eigenvectors become dependent.
 ///
 /// For a real eigenvalue this is the normal of the plane that the others span, projected onto the
@@ -106,7 +106,7 @@ fn enlarge_volume(problem: &AssignableSubspaces, start: usize) -> Result<Directi
     Ok(directions)
 }
 
-/// The w, of any length, whose eigenvectors span the largest volume with the others.
+/// The direction w, of any length, whose eigenvectors span the largest volume with the other eigenvectors.
 ///
 /// `normals`: n x 1 for a real eigenvalue, n x 2 for a pair, its columns normal to the other eigenvectors.
 /// `space.states` maps w to v, or to [v1; v2] of a pair, whose volume is in proportion to |w' `form` w|. `shift` makes

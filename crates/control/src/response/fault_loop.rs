@@ -85,7 +85,7 @@ pub fn fault_rate_system(
 }
 
 /// The part of [`fault_system`] or [`fault_rate_system`] on which e and eps depend: its states are
-/// [e; `f_hat`] or [e; eps], n + q. The states of the plant and the integrals do not act on them, so that outputs
+/// [e; `f_hat`] or [e; eps], n + q. The states of the plant and the integrals do not act on e and eps, so that outputs
 /// in e and eps keep their transfer functions; outputs in x do not.
 #[must_use]
 pub fn error_part(plant: &FaultyPlant, system: &StateSpace) -> StateSpace {

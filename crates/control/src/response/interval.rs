@@ -109,8 +109,8 @@ impl Intervals {
     }
 
     /// Adds lengths for one output, each twice the one before, until the bound of the integral after an interval of the
-    /// last length is at most `part` times a lower bound of the integral over it, for one input. Returns the number of
-    /// lengths that this input needs, which may be fewer than there are.
+    /// last length is at most `part` times a lower bound of the integral over this interval, for one input. Returns the
+    /// number of lengths that this input needs, at most the number of all lengths.
     pub(super) fn extend(
         &mut self,
         lengths: &mut Vec<Length>,

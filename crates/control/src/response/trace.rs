@@ -44,14 +44,13 @@ impl TimeResponse {
 
 /// Computes the response to a unit step of one input, from rest.
 ///
-/// `input`: its index, from 0. The system must be stable. The grid has ten steps (four from 48 states
-/// on) per time constant or radian of the fastest mode that has not yet decayed; a mode counts as decayed
-/// after 25 time constants. A real mode adds about 250 points. Each point is exact up to rounding for every step
-/// size: it is computed by matrix exponentials, in sampled time by powers of A, with steps of whole
-/// samples. A response has at most about 200000 points: an oscillation damped so lightly that it needs
-/// more gets fewer per radian, and a peak between them is missed. Rates 1e5 apart lose about four digits.
-/// Cost: about 20 (n + 2 m)^3 multiplications per mode, n (n + p) per point; from 48 states on the outputs
-/// are products of large matrices, whose last bits depend on the processor.
+/// `input`: the index of the input, from 0. The system must be stable. The grid has ten steps (four from 48 states on)
+/// per time constant or radian of the fastest mode that has not yet decayed; a mode counts as decayed after 25 time
+/// constants. A real mode adds about 250 points. Each point is exact up to rounding for every step size: it is computed
+/// by matrix exponentials, in sampled time by powers of A, with steps of whole samples. A response has at most about
+/// 200000 points: an oscillation damped so lightly that it needs more gets fewer per radian, and a peak between them is
+/// missed. Rates 1e5 apart lose about four digits. Cost: about 20 (n + 2 m)^3 multiplications per mode, n (n + p) per
+/// point; from 48 states on the outputs are products of large matrices, whose last bits depend on the processor.
 ///
 /// # Errors
 ///
@@ -126,7 +125,7 @@ fn response(system: &StateSpace, input: usize, rise: Option<f64>) -> Result<Time
     simulation.into_response()
 }
 
-/// A duration this close, relatively, to a whole number of samples counts as that number.
+/// A duration within this relative difference of a whole number of samples counts as this number.
 const ON_A_SAMPLE: f64 = 1e-9;
 
 /// The modes of a system, and its period.

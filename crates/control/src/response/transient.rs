@@ -21,11 +21,11 @@ pub struct Transient {
 impl TimeResponse {
     /// Computes peak and settling time of an output.
     ///
-    /// `output`: its index, from 0. The band is `fraction` times the largest distance of z from its
-    /// final value. In continuous time peaks between grid points are those of the cubic through both values and
-    /// slopes (error 1e-6 of the peak, 1e-5 from 48 states on), and settling times are interpolated linearly
-    /// after the last point or peak outside of the band. In sampled time, and if the points do not follow every
-    /// oscillation, peaks and settling times are at grid points.
+    /// `output`: the index of the output, from 0. The band is `fraction` times the largest distance of z from its final
+    /// value. In continuous time peaks between grid points are those of the cubic through both values and slopes (error
+    /// 1e-6 of the peak, 1e-5 from 48 states on), and settling times are interpolated linearly after the last point or
+    /// peak outside of the band. In sampled time, and if the points do not follow every oscillation, peaks and settling
+    /// times are at grid points.
     ///
     /// # Panics
     ///

@@ -10,7 +10,7 @@ pub(super) struct Evaluation {
     pub(super) value: f64,
 }
 
-/// Narrows an interval in which a function changes its sign; returns its ends in the given order.
+/// Narrows an interval in which a function changes its sign; returns the ends of the interval in the given order.
 ///
 /// `low`, `high`: the ends, with values of different signs; NaN counts as negative. The function need not be
 /// continuous. Method: regula falsi in the Illinois variant (M. Dowell and P. Jarratt, BIT 11, 1971); every third step

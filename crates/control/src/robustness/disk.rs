@@ -47,8 +47,8 @@ impl DiskMargin {
     }
 }
 
-/// Computes the disk margin for simultaneous, independent changes in all channels at `at`; for one
-/// channel alone `channel` is its index.
+/// Computes the disk margin for simultaneous, independent changes in all channels at `at`; `channel` is the index of a
+/// single channel, or None for all.
 ///
 /// ```text
 /// alpha = 1 / max over frequency of mu((S - T) / 2)

@@ -66,7 +66,7 @@ impl OpenedLoop {
     }
 
     /// [`super::sampled_delay_margin`] of a loop opened at its input; `plant`, continuous or sampled, and `controller`,
-    /// sampled: those of the loop.
+    /// sampled, form the loop.
     pub fn sampled_delay_margin(
         &self,
         plant: &StateSpace,

@@ -29,9 +29,9 @@ pub struct ScaledPeak {
 /// Minimises the largest singular value of D M D^-1 over the positive diagonal matrices D: an upper
 /// bound of the structured singular value, equal to it up to three channels.
 ///
-/// Returns the bound and the logarithms of D. ln(bound) is a convex function of ln D with the
-/// gradient |u|^2 - |v|^2, u and v the singular vectors. Method: Osborne's balancing, then the
-/// ellipsoid method until lower and upper bound differ by at most 1e-5, relative.
+/// Returns the bound and the logarithms of D. ln(bound) is a convex function of ln D with the gradient |u|^2 - |v|^2
+/// for the singular vectors u and v. Method: Osborne's balancing, then the ellipsoid method until lower and upper bound
+/// differ by at most 1e-5, relative.
 ///
 /// Source: J. C. Doyle, Analysis of feedback systems with structured uncertainties, IEE Proc. D 129
 /// (1982).

@@ -143,7 +143,7 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
         random_deviations(self.family.count(), cases, seed)
     }
 
-    /// Computes the instability of the loop with the plant of these deviations.
+    /// Computes the instability of the loop with the plant of `deviations`.
     pub fn evaluate(&self, deviations: Vec<f64>) -> Result<ToleranceCase, F::Error> {
         let instability = self.instability(&deviations)?;
         Ok(ToleranceCase { instability, deviations })
@@ -221,7 +221,7 @@ pub struct EntryFamily<'a> {
 }
 
 impl<'a> EntryFamily<'a> {
-    /// The plants whose entries are those of `plant` within `tolerances`.
+    /// The plants whose entries differ from the entries of `plant` by at most `tolerances`.
     ///
     /// # Errors
     ///

@@ -34,8 +34,8 @@ pub struct Structure<'a> {
 }
 
 impl Structure<'_> {
-    /// The feedback of this structure whose commands are nearest to those of u = K x, with white noise added to the
-    /// commands:
+    /// The feedback with the free entries of this structure whose commands are nearest to those of u = K x, with white
+    /// noise added to the commands:
     ///
     /// ```text
     /// k_s = k X S' (S X S')^+,   (A + B K) X + X (A + B K)' + B B' = 0

@@ -13,11 +13,11 @@ const MOST_SAMPLES: f64 = 1e6;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{name} = {value}, expected {rule}")]
 pub struct Refusal {
-    /// The entry.
+    /// The name of the entry.
     pub name: String,
     /// The value of the entry.
     pub value: f64,
-    /// The range.
+    /// The allowed range of the entry.
     pub rule: &'static str,
 }
 

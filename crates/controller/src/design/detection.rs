@@ -40,7 +40,7 @@ pub struct DetectionDesign {
     /// D_y, rows x p.
     #[serde(rename = "D_y")]
     pub d_y: Matrix,
-    /// The initial x_r is this matrix times the initial estimate of the states; k x n.
+    /// Maps the initial estimate of the states to the initial x_r, k x n.
     pub start: Matrix,
     /// The faults that `fault_isolated` counts, from 1.
     pub faults: Vec<String>,

@@ -6,7 +6,7 @@ use super::Refusal;
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {reason}")]
 pub struct DesignError {
-    /// The file.
+    /// The path of the file.
     pub path: String,
     /// The reason why the file cannot be used.
     pub reason: Reason,

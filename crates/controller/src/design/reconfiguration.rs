@@ -21,7 +21,7 @@ pub struct Reconfiguration {
     /// K_f, m x q.
     #[serde(rename = "K_f")]
     pub k_f: Option<Matrix>,
-    /// K_s, m numbers.
+    /// K_s, m numbers: the gains from the stuck command to the commands.
     #[serde(rename = "K_s")]
     pub k_s: Option<Vec<f64>>,
     /// The states of the fault model that restart at 0 when the actuator fails or comes back.
@@ -33,7 +33,7 @@ pub struct Reconfiguration {
     /// The actuator counts as gone after its estimated loss of effectiveness has been above `loss` for `time` s.
     /// Without `loss` and `time`, only an input of the FMU reports the failure.
     pub loss: Option<f64>,
-    /// See `loss`; in s.
+    /// The time in s for which the estimated loss must be above `loss`.
     pub time: Option<f64>,
 }
 

@@ -41,7 +41,7 @@ macro_rules! signals {
         }
 
         impl $signal {
-            /// Unit and meaning.
+            /// The unit and the meaning of the signal.
             pub fn label(&self) -> Label<'_> {
                 let text = if self.description.is_empty() { &self.name } else { &self.description };
                 Label { unit: self.unit.as_ref(), meaning: text }
@@ -76,7 +76,7 @@ signals! {
         limits: Option<[f64; 2]>,
     }
 
-    /// A state of the fault model: a fault, or the rate of one.
+    /// A state of the fault model: a fault, or the rate of a fault.
     Fault {
         /// The actuator whose loss of effectiveness this fault is.
         loss_of: Option<String>,
@@ -86,14 +86,14 @@ signals! {
 }
 
 impl Measurement {
-    /// The smallest and the largest value that is used; without a range these are the largest finite numbers.
+    /// The smallest and the largest valid value; without a range, the largest finite numbers of both signs.
     #[must_use]
     pub fn bounds(&self) -> [f64; 2] {
         self.range.unwrap_or([-f64::MAX, f64::MAX])
     }
 
-    /// The most samples for which the last value may be used: those within the longest hold, up to rounding. `None`
-    /// without a longest hold, or if they are `u32::MAX` or more.
+    /// The most samples for which the last value may be used: the samples within the longest hold, up to rounding.
+    /// `None` without a longest hold, or for `u32::MAX` samples or more.
     #[must_use]
     pub fn most_held(&self, sample_time: f64) -> Option<u32> {
         let samples = (self.longest_hold? * (1.0 + HOLD_ROUNDING) / sample_time).floor();

@@ -67,8 +67,8 @@ impl LossyLoop {
         certify_common(&self.corners(largest), region, self.domain)
     }
 
-    /// The largest decay rate in 1/s that one Lyapunov matrix proves for all losses from 0 to `largest`,
-    /// to 1 %; None if there is none above a thousandth of the slowest decay rate of a corner.
+    /// The largest decay rate in 1/s that one Lyapunov matrix proves for all losses from 0 to `largest`, to 1 %; None
+    /// if no rate above a thousandth of the slowest decay rate of a corner is proven.
     ///
     /// # Errors
     ///

@@ -37,8 +37,8 @@ impl Response {
         Ok(if frequency < 0.0 { m.map(|x| x.conj()) } else { m })
     }
 
-    /// The largest interval about `frequency` in which `scales` hold for their bound; None if they do not hold there,
-    /// or the Hamiltonian matrix does not exist.
+    /// The largest interval about `frequency` in which `scales` hold for their bound; None if `scales` do not hold at
+    /// `frequency`, or the Hamiltonian matrix does not exist.
     ///
     /// F, see [`super::form::form`], is positive definite at `frequency` and singular only at the imaginary
     /// eigenvalues of a Hamiltonian matrix, so that F is definite up to the first of them on each side. Which
