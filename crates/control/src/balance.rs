@@ -16,7 +16,7 @@ const LARGE: f64 = 1024.0;
 /// state whose row or column has no other entries is not changed.
 pub(crate) struct Balance {
     pub(crate) matrix: DMatrix<f64>,
-    /// Diagonal of S, powers of two.
+    /// The scales: the diagonal of S, powers of two.
     pub(crate) scale: DVector<f64>,
 }
 
@@ -141,22 +141,22 @@ pub(crate) fn power_of_two(x: f64) -> f64 {
     libm::ldexp(1.0, nearest)
 }
 
-/// Diag(d)^-1 M.
+/// Divides the rows of M by the entries of d.
 pub(crate) fn divide_rows(m: &DMatrix<f64>, d: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / d[i])
 }
 
-/// Diag(d) M.
+/// Multiplies the rows of M by the entries of d.
 pub(crate) fn multiply_rows(m: &DMatrix<f64>, d: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * d[i])
 }
 
-/// M Diag(d).
+/// Multiplies the columns of M by the entries of d.
 pub(crate) fn multiply_columns(m: &DMatrix<f64>, d: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * d[j])
 }
 
-/// M Diag(d)^-1.
+/// Divides the columns of M by the entries of d.
 pub(crate) fn divide_columns(m: &DMatrix<f64>, d: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / d[j])
 }

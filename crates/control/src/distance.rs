@@ -199,7 +199,7 @@ struct Minimum {
 struct Square {
     bound: f64,
     centre: Complex<f64>,
-    /// Half of the side length.
+    /// Half of the side length of the square.
     half: f64,
 }
 

@@ -18,9 +18,9 @@ use nalgebra::{DMatrix, DVector};
 pub struct FirstOrderHold {
     /// Phi, n x n.
     pub phi: DMatrix<f64>,
-    /// `Gamma_0`, n x m, times the input at the start of the step.
+    /// `Gamma_0`, n x m: the effect of the input at the start of the step.
     pub gamma_0: DMatrix<f64>,
-    /// `Gamma_1`, n x m, times the slope of the input.
+    /// `Gamma_1`, n x m: the effect of the slope of the input.
     pub gamma_1: DMatrix<f64>,
 }
 

@@ -205,7 +205,7 @@ impl Equation {
         Ok(symmetric_part(&p))
     }
 
-    /// See [`Solution::residual`].
+    /// Computes [`Solution::residual`].
     fn residual(&self, a: &DMatrix<f64>, p: &DMatrix<f64>, q: &DMatrix<f64>) -> f64 {
         relative(&(self.remainder)(a, p, q), &(self.terms)(&a.abs(), &sizes(p), &q.abs()))
     }

@@ -303,11 +303,11 @@ impl PlacementProblem<'_> {
 
 /// The eigenvectors that can be assigned, in coordinates z with x = S z, S diagonal.
 struct Assignable {
-    /// S^-1 A S.
+    /// A in the coordinates z: S^-1 A S.
     a: DMatrix<f64>,
-    /// S^-1 B X, n x r, its columns orthonormal.
+    /// B X in the coordinates z: S^-1 B X, n x r, with orthonormal columns.
     b: DMatrix<f64>,
-    /// X, m x r.
+    /// X, m x r, from [`input_basis`].
     basis: DMatrix<f64>,
     /// The subspaces of the eigenvectors for the scaled A and B.
     problem: AssignableSubspaces,

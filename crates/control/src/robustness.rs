@@ -211,7 +211,7 @@ impl Loop {
         system
     }
 
-    /// S - I = -T.
+    /// The system S - I = -T at `at`.
     fn response(&self, at: Point) -> StateSpace {
         let [b, c] = [self.inputs(), self.signals()].map(|[input, output]| match at {
             Point::Input => input,

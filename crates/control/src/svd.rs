@@ -25,7 +25,7 @@ const NEGLIGIBLE: f64 = 1e-40;
 pub(crate) struct Svd {
     /// U, r x c; a column is zero where its singular value is zero.
     pub(crate) left: DMatrix<f64>,
-    /// The diagonal of S, c values, descending.
+    /// The c singular values, descending: the diagonal of S.
     pub(crate) values: DVector<f64>,
     /// V, c x c.
     pub(crate) right: DMatrix<f64>,

@@ -288,15 +288,15 @@ pub fn reference_system(
 /// The way in which references act on the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Action<'a> {
-    /// By integrals.
+    /// Integral action.
     Integral {
-        /// H C, t x n.
+        /// H C, t x n: from the states to H y.
         output: &'a DMatrix<f64>,
         /// `K_i`, m x t.
         gain: &'a DMatrix<f64>,
-        /// `N_r`, m x t, beside the integrals.
+        /// The feedforward `N_r`, m x t, in addition to the integrals.
         feedforward: Option<&'a DMatrix<f64>>,
     },
-    /// By the feedforward `N_r`, m x t.
+    /// The feedforward `N_r`, m x t, without integrals.
     Feedforward(&'a DMatrix<f64>),
 }

@@ -150,11 +150,11 @@ pub fn detection_filter(
     }
 }
 
-/// T, H and N of the observer, from inputs scaled to columns of length one.
+/// T, H and N of the observer of [`detection_filter`], for inputs scaled to columns of length one.
 struct UnknownInputObserver {
     /// Q, n x k: an orthonormal basis of the range of T.
     basis: DMatrix<f64>,
-    /// Q' T, k x n.
+    /// Q' T, k x n: T in the coordinates of Q.
     projection: DMatrix<f64>,
     /// H, n x p.
     h: DMatrix<f64>,
@@ -163,7 +163,7 @@ struct UnknownInputObserver {
 }
 
 impl UnknownInputObserver {
-    /// None if the rank condition fails, no measurement is left, or T is zero.
+    /// Computes the observer; None if the rank condition fails, no measurement is left, or T is zero.
     fn new(plant: &NoisyPlant, unknown: &[UnknownInput]) -> Result<Option<Self>, Error> {
         let (n, p) = (plant.a.nrows(), plant.c.nrows());
         let columns = |of: fn(&UnknownInput) -> &DVector<f64>, rows: usize| {

@@ -176,7 +176,7 @@ struct Reflection {
 }
 
 impl Reflection {
-    /// None if the vector is on the first axis, or not finite.
+    /// The reflection of a vector; None if the vector is on the first axis, or not finite.
     fn new([first, second, third]: [f64; 3]) -> Option<Self> {
         let size = first.abs() + second.abs() + third.abs();
         if second.abs() + third.abs() <= 0.0 || !size.is_finite() {

@@ -115,8 +115,8 @@ struct HiddenDisturbance {
 }
 
 impl HiddenDisturbance {
-    /// None if D has not full row rank, d reaches no state, or there is no Kalman filter with a positive definite
-    /// covariance.
+    /// Computes the system; None if D does not have full row rank, d reaches no state, or there is no Kalman filter
+    /// with a positive definite covariance.
     fn new(
         a: &DMatrix<f64>,
         c: &DMatrix<f64>,
@@ -203,8 +203,8 @@ impl HiddenDisturbance {
         grid(&[&[&self.a, &self.b]])
     }
 
-    /// A X + X A' + B Y + Y' B' of the covariance [X, Y'; Y, U]; sampled: [A, B] [X, Y'; Y, U]
-    /// [A, B]' - X.
+    /// The growth of X in the covariance [X, Y'; Y, U] of (x, d): A X + X A' + B Y + Y' B'; in sampled time
+    /// [A, B] [X, Y'; Y, U] [A, B]' - X.
     fn growth(&self, covariance: &Affine) -> Affine {
         let (order, free) = self.b.shape();
         let state = DMatrix::identity(order, order + free);

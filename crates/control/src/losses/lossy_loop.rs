@@ -92,7 +92,7 @@ impl LossyLoop {
         Ok(Self { effects, intact, domain: controller.domain })
     }
 
-    /// A(E); `loss`: one number for each input.
+    /// The dynamics A(E) for the losses E = `loss`, one number for each input.
     #[must_use]
     pub fn at(&self, loss: &[f64]) -> DMatrix<f64> {
         let parts = self.effects.iter().zip(loss);

@@ -21,9 +21,9 @@ pub(crate) struct Staircase {
     pub(crate) uncontrollable_basis: DMatrix<f64>,
     /// R, the dynamics of the uncontrollable states.
     pub(crate) uncontrollable: DMatrix<f64>,
-    /// Diagonal of S, powers of two.
+    /// The scales of the states: the diagonal of S, powers of two.
     pub(crate) scale: DVector<f64>,
-    /// S^-1 A S.
+    /// The balanced A: S^-1 A S.
     balanced: DMatrix<f64>,
 }
 

@@ -21,9 +21,9 @@ const MOST_STATES: usize = 1 << 14;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Bracket {
-    /// p x m.
+    /// The lower bounds, p x m.
     pub lower: DMatrix<f64>,
-    /// p x m.
+    /// The upper bounds, p x m.
     pub upper: DMatrix<f64>,
 }
 

@@ -130,9 +130,9 @@ const ON_A_SAMPLE: f64 = 1e-9;
 
 /// The modes of a system, and its period.
 struct Modes {
-    /// The fastest decay first.
+    /// The modes, the fastest decay first.
     list: Vec<Mode>,
-    /// Zero in continuous time.
+    /// The sample period; zero in continuous time.
     period: f64,
 }
 

@@ -5,7 +5,8 @@ use crate::blocks::symmetric_part;
 use crate::lyapunov::{self, relative, sizes};
 use nalgebra::DMatrix;
 
-/// Each sum of terms counts as at least this fraction of the largest sum.
+/// A sum of terms counts as at least this fraction of the largest sum, so that rounding errors of small sums do not
+/// count.
 const FLOOR: f64 = 1e-6;
 
 /// A Riccati equation of continuous or sampled time, with the weights Q, N and R = I.

@@ -191,7 +191,7 @@ impl NormFilter {
         Some(symmetric_part(&output.tr_mul(&symmetric_part(&rest).cholesky()?.solve(&output))))
     }
 
-    /// L - S R^-1; `covariance`: X, in sampled time Y; None if the gain cannot be computed.
+    /// The part L - S R^-1 of the gain; `covariance`: X, in sampled time Y; None if it cannot be computed.
     fn gain_of(&self, covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let crossed = &self.c * covariance;
         Some(match self.domain {

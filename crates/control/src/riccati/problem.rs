@@ -24,7 +24,7 @@ pub(super) struct ScaledProblem {
     pub(super) decoupled_a: DMatrix<f64>,
     /// Q - N N', the weight of the states after this substitution.
     pub(super) decoupled_q: DMatrix<f64>,
-    /// Diagonal of S, powers of two.
+    /// The scales of the states: the diagonal of S, powers of two.
     scale: DVector<f64>,
     /// L, the Cholesky factor of the weight R.
     factor: DMatrix<f64>,
@@ -147,17 +147,17 @@ pub(super) fn balancing(a: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) ->
     DVector::from_fn(order, |i, _| power_of_two((scale[i] / scale[order + i]).sqrt()))
 }
 
-/// S^-1 M S.
+/// S^-1 M S, with the diagonal S of `scale`.
 pub(super) fn similar(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
     divide_rows(&multiply_columns(m, scale), scale)
 }
 
-/// S M S.
+/// S M S, with the diagonal S of `scale`.
 pub(super) fn multiplied(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
     multiply_rows(&multiply_columns(m, scale), scale)
 }
 
-/// S^-1 M S^-1.
+/// S^-1 M S^-1, with the diagonal S of `scale`.
 pub(super) fn divided(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
     divide_rows(&divide_columns(m, scale), scale)
 }

@@ -14,7 +14,7 @@ const STEP: f64 = 1.04;
 /// A frequency response on a grid that includes the resonances of the system.
 pub(super) struct Sweep<'a> {
     pub(super) response: &'a KnownResponse,
-    /// Ascending, in rad per unit of time.
+    /// The frequencies of the grid, ascending, in rad per unit of time.
     pub(super) frequencies: Vec<f64>,
     /// The response at each of `frequencies`.
     pub(super) values: Vec<DMatrix<Complex<f64>>>,

@@ -25,7 +25,7 @@ pub enum InterpolatedWindup {
     Stable,
     /// Unstable at one value for one set of commands at their limits.
     Unstable {
-        /// s, from 0 at the first point to 1 at the second.
+        /// The value s: 0 at the first point, 1 at the second.
         part: f64,
         /// The indices, from 0, of the commands at their limits.
         limited: Vec<usize>,

@@ -158,7 +158,7 @@ impl<'a> Grid<'a> {
 }
 
 impl ClosedLoop {
-    /// `gain`: [K, `K_r`]; `references`: H.
+    /// Computes the loop from `gain` = [K, `K_r`], G = `plant` and H = `references`.
     fn new(gain: &ComplexMatrix, plant: &ComplexMatrix, references: &DMatrix<f64>) -> Option<Self> {
         let (p, m) = plant.shape();
         let k = gain.columns(0, p).into_owned();
