@@ -51,7 +51,7 @@ pub(crate) struct Detector {
     pub(crate) statistics: Vec<f64>,
     tests: Vec<TestState>,
     pub(crate) decision: Decision,
-    /// The input `detection_reset`.
+    /// The value of the input `detection_reset`.
     pub(crate) reset: bool,
     #[serde(skip)]
     work: Work,

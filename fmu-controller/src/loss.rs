@@ -49,7 +49,7 @@ impl Loss {
         *f_hat.get(self.fault).unwrap_or(&z[n + self.fault])
     }
 
-    /// `E_hat = -u f_hat / (u^2 + u_e^2)` for a command and an estimated fault.
+    /// Computes `E_hat = -u f_hat / (u^2 + u_e^2)` from a command and an estimated fault.
     pub(crate) fn effectiveness_lost<D: Number>(&self, u: D, f_hat: D) -> D {
         let scale = (u * u + self.least_command * self.least_command).recip();
         -(u * scale) * f_hat

@@ -56,7 +56,7 @@ pub(crate) struct Reconfigurator {
 }
 
 impl Reconfigurator {
-    /// No actuator of `design` is gone.
+    /// The state in which no actuator of `design` is gone.
     pub(crate) fn new(design: &Design) -> Self {
         Self {
             reported: vec![false; design.actuators.len()],

@@ -34,11 +34,11 @@ pub struct KalmanFilter {
     method: i32,
     integration_steps: i32,
     every: Vec<i32>,
-    /// `x_hat_0` and `f_hat_0`, one after the other.
+    /// The initial estimates `x_hat_0` and `f_hat_0`, one after the other.
     initial: Vec<f64>,
-    /// `x_hat` and `f_hat`, one after the other, with their covariance.
+    /// The estimates `x_hat` and `f_hat`, one after the other, with their covariance.
     estimate: Estimate,
-    /// `x_deviation` and `f_deviation`, one after the other.
+    /// The standard deviations `x_deviation` and `f_deviation`, one after the other.
     deviations: Vec<f64>,
     innovation_squared: f64,
     /// The measurements, and their derivatives with respect to time.

@@ -14,9 +14,9 @@ pub(crate) type State<D = f64> = [D; 4];
 pub(crate) struct Force {
     /// Force at `start`, in N.
     pub(crate) value: f64,
-    /// First derivative at `start`, in N/s.
+    /// First derivative of the force at `start`, in N/s.
     pub(crate) slope: f64,
-    /// Second derivative, in N/s².
+    /// Second derivative of the force, in N/s².
     pub(crate) curvature: f64,
     /// The time in s to which `value` and `slope` belong.
     pub(crate) start: f64,
@@ -49,7 +49,7 @@ impl Force {
         [self.value, self.slope, self.curvature, self.start].iter().all(|part| part.is_finite())
     }
 
-    /// The same polynomial in the time elapsed since `origin`.
+    /// The force as a polynomial of the time elapsed since `origin`.
     pub(crate) fn seen_from(&self, origin: f64) -> Self {
         Self {
             value: self.at(origin),

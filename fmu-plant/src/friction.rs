@@ -22,7 +22,7 @@ impl Regime {
         self as i32
     }
 
-    /// [`Regime::number`] as `f64`.
+    /// The number [`Regime::number`] as `f64`.
     pub(crate) fn sign(self) -> f64 {
         f64::from(self.number())
     }

@@ -56,7 +56,7 @@ pub(crate) enum Failure {
     /// The force, the state or its derivative is infinite or not a number.
     #[error("force, state or its derivative is not finite after t = {time} s")]
     NotFinite {
-        /// Time reached in s.
+        /// The time reached in s.
         time: f64,
     },
     /// No step is short enough for the tolerance.
@@ -170,7 +170,7 @@ impl Motion {
         Ok(motion)
     }
 
-    /// `[x_p, theta, v_p, omega]` in m, rad, m/s, rad/s.
+    /// The state `[x_p, theta, v_p, omega]` in m, rad, m/s, rad/s.
     pub(crate) fn state(&self) -> &State {
         &self.state
     }

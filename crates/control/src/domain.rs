@@ -44,7 +44,7 @@ impl Domain {
         }
     }
 
-    /// s = j w, or z = e^(j w T), at the frequency w in rad per unit of time.
+    /// The point s = j w, or z = e^(j w T), at the frequency w in rad per unit of time.
     pub(crate) fn point(self, frequency: f64) -> Complex<f64> {
         match self {
             Self::Continuous => Complex::new(0.0, frequency),

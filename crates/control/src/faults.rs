@@ -29,9 +29,9 @@ use nalgebra::{DMatrix, DVector};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FaultKind {
-    /// f' = 0.
+    /// A constant fault, f' = 0.
     Constant,
-    /// f' = g, g' = 0: the estimate follows a ramp without a lag.
+    /// A ramp, f' = g, g' = 0: the estimate follows a ramp without a lag.
     Ramp,
 }
 
@@ -45,9 +45,9 @@ pub enum FaultEntry {
     Sensor(DVector<f64>),
     /// In states and measurements, x' = A x + B u + `states` f, y = C x + `measurements` f; n and p entries.
     Both {
-        /// The column of `F_a`.
+        /// The column of `F_a`: the effect on the states.
         states: DVector<f64>,
-        /// The column of `F_s`.
+        /// The column of `F_s`: the effect on the measurements.
         measurements: DVector<f64>,
     },
     /// The input with this index, from zero, loses the fraction E of its effect: f = -E u.

@@ -52,14 +52,15 @@ impl FaultyPlant {
         check::shape("A_f", &self.a_f, (self.f_a.ncols(), self.f_a.ncols()))
     }
 
-    /// `A_0` = [A, -`F_a`; 0, `A_f`], (n + q) x (n + q); (10) of [`crate::aso`] if B `K_f` = -`F_a`, `A_f` = 0.
+    /// The dynamics of states and faults, `A_0` = [A, -`F_a`; 0, `A_f`], (n + q) x (n + q); (10) of [`crate::aso`] if B
+    /// `K_f` = -`F_a`, `A_f` = 0.
     #[must_use]
     pub fn augmented_dynamics(&self) -> DMatrix<f64> {
         let (n, q) = self.f_a.shape();
         block_2x2([&self.a, &-&self.f_a], [&DMatrix::zeros(q, n), &self.a_f])
     }
 
-    /// `C_0` = [C, 0], p x (n + q).
+    /// The measurements of states and faults, `C_0` = [C, 0], p x (n + q).
     #[must_use]
     pub fn augmented_output(&self) -> DMatrix<f64> {
         let (n, q) = self.f_a.shape();

@@ -32,13 +32,13 @@ pub enum Estimator {
 pub struct Gains {
     /// How the observer uses the newest measurement.
     pub estimator: Estimator,
-    /// `K_x`, m x n.
+    /// `K_x`, m x n: the feedback of the estimated states.
     pub k_x: DMatrix<f64>,
-    /// `K_f`, m x q.
+    /// `K_f`, m x q: the compensation of the estimated faults.
     pub k_f: DMatrix<f64>,
-    /// `L_x`, n x p.
+    /// `L_x`, n x p: the observer gain of the states.
     pub l_x: DMatrix<f64>,
-    /// `L_f`, q x p.
+    /// `L_f`, q x p: the observer gain of the faults.
     pub l_f: DMatrix<f64>,
     /// `P_f`, q x p; None without a direct term.
     pub p_f: Option<DMatrix<f64>>,

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 /// only this case. A stable system stays stable for every step size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirstOrderHold {
-    /// Phi, n x n.
+    /// Phi, n x n: the effect of the state at the start of the step.
     pub phi: DMatrix<f64>,
     /// `Gamma_0`, n x m: the effect of the input at the start of the step.
     pub gamma_0: DMatrix<f64>,

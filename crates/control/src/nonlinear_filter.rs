@@ -31,13 +31,13 @@ pub trait SampledPlant {
     /// Why the plant has no value, or no derivative, at some z.
     type Error;
 
-    /// Replaces z by g(z).
+    /// Replaces z by g(z), its value at the next sample.
     fn advance(&mut self, z: &mut [f64]) -> Result<(), Self::Error>;
 
     /// Replaces z by g(z), and sets `g` to the Jacobian of g, N x N, at the former z.
     fn advance_tangent(&mut self, z: &mut [f64], g: &mut DMatrix<f64>) -> Result<(), Self::Error>;
 
-    /// Sets y to h(z).
+    /// Sets y to the measurements h(z).
     fn measure(&mut self, z: &[f64], y: &mut [f64]) -> Result<(), Self::Error>;
 
     /// Sets y to h(z), and `h` to the Jacobian of h, p x N, at z.

@@ -41,7 +41,7 @@ const MOST_OF_LARGE: usize = 2;
 /// A state feedback u = K x with assigned eigenvalues.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placement {
-    /// K, m x n.
+    /// The feedback gain K, m x n.
     pub gain: DMatrix<f64>,
     /// The quality of the assignment.
     pub quality: Quality,
@@ -311,7 +311,7 @@ struct Assignable {
     basis: DMatrix<f64>,
     /// The subspaces of the eigenvectors for the scaled A and B.
     problem: AssignableSubspaces,
-    /// Diagonal of S.
+    /// The units of the states: the diagonal of S.
     units: DVector<f64>,
 }
 

@@ -17,15 +17,15 @@ use nalgebra::DMatrix;
 pub struct ResidualGenerator {
     /// A, n x n.
     pub a: DMatrix<f64>,
-    /// `B_u`, n x m.
+    /// `B_u`, n x m: the effect of the commands on the states.
     pub b_u: DMatrix<f64>,
-    /// `B_y`, n x p.
+    /// `B_y`, n x p: the effect of the measurements on the states.
     pub b_y: DMatrix<f64>,
     /// C, k x n.
     pub c: DMatrix<f64>,
-    /// `D_u`, k x m.
+    /// `D_u`, k x m: the effect of the commands on the residuals.
     pub d_u: DMatrix<f64>,
-    /// `D_y`, k x p.
+    /// `D_y`, k x p: the effect of the measurements on the residuals.
     pub d_y: DMatrix<f64>,
     /// Continuous or sampled time.
     pub domain: Domain,

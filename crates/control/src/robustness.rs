@@ -65,9 +65,9 @@ use nalgebra::DMatrix;
 /// Where the loop is opened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Point {
-    /// At the commands.
+    /// The loop is opened at the commands.
     Input,
-    /// At the measurements.
+    /// The loop is opened at the measurements.
     Output,
 }
 

@@ -23,11 +23,11 @@ const NEGLIGIBLE: f64 = 1e-40;
 /// accuracy: J. Demmel and K. Veselic, Jacobi's method is more accurate than QR, SIAM J. Matrix
 /// Anal. Appl. 13 (1992).
 pub(crate) struct Svd {
-    /// U, r x c; a column is zero where its singular value is zero.
+    /// U, r x c, the left singular vectors; a column is zero where its singular value is zero.
     pub(crate) left: DMatrix<f64>,
     /// The c singular values, descending: the diagonal of S.
     pub(crate) values: DVector<f64>,
-    /// V, c x c.
+    /// V, c x c: the right singular vectors.
     pub(crate) right: DMatrix<f64>,
 }
 

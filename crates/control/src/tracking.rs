@@ -46,14 +46,14 @@ const SWEEPS: usize = 4;
 /// Integral action of a controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IntegralAction {
-    /// H, t x p.
+    /// H, t x p: H y follows the references.
     pub h: DMatrix<f64>,
     /// H C, t x n, from the states of the observer's model to H y; zero for the states of a measurement filter, because
     /// y is taken before the filter.
     pub output: DMatrix<f64>,
     /// H `F_s`, t x q: the effect of the faults on H y.
     pub faults: DMatrix<f64>,
-    /// `K_i`, m x t.
+    /// `K_i`, m x t: the gain of the integrals.
     pub gain: DMatrix<f64>,
 }
 
@@ -292,7 +292,7 @@ pub enum Action<'a> {
     Integral {
         /// H C, t x n: from the states to H y.
         output: &'a DMatrix<f64>,
-        /// `K_i`, m x t.
+        /// `K_i`, m x t: the gain of the integrals.
         gain: &'a DMatrix<f64>,
         /// The feedforward `N_r`, m x t, in addition to the integrals.
         feedforward: Option<&'a DMatrix<f64>>,

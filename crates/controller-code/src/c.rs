@@ -31,7 +31,7 @@ struct Source<'a> {
     request: &'a Request<'a>,
     controller: &'a Controller,
     fields: &'a Fields,
-    /// `double` or `float`.
+    /// The name of the number type: `double` or `float`.
     real: &'static str,
     /// The start of the names of macros: the prefix in capitals.
     capital: String,

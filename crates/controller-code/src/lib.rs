@@ -97,9 +97,9 @@ pub struct Request<'a> {
     /// The common delay of all commands, in s, at which the loop becomes unstable; infinite if no delay destabilises
     /// the loop, `None` if the delay is not known.
     pub delay_margin: Option<f64>,
-    /// The language.
+    /// The programming language of the code.
     pub language: Language,
-    /// The numbers.
+    /// The precision of the numbers in the code.
     pub precision: Precision,
 }
 

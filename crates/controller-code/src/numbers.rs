@@ -182,7 +182,7 @@ impl<N: Number> Vectors<N> {
 
 /// The state of a controller before a sample, and the inputs of the sample.
 pub(super) struct Memory<N> {
-    /// `x_hat`, `f_hat`, `y_f`, `x_i`, `u_t`, `u_before`, u.
+    /// The stored vectors `x_hat`, `f_hat`, `y_f`, `x_i`, `u_t`, `u_before`, u.
     stored: [Vec<N>; 7],
     /// The measurements y and the references r.
     inputs: [Vec<N>; 2],

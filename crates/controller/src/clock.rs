@@ -17,7 +17,7 @@ pub fn clock_rounding(time: f64) -> f64 {
 pub struct Clock {
     /// The period T in s.
     period: f64,
-    /// Instant 0 in s.
+    /// The time of instant 0 in s.
     start: f64,
     /// The number k of the next instant: a whole number, exact up to 2^53.
     next: f64,

@@ -71,7 +71,7 @@ pub struct Design {
     /// D, p x m, of y = C x + D u, stated together with a filter; `None`: no feedthrough.
     #[serde(rename = "D")]
     pub d: Option<Matrix>,
-    /// F_a, n x q.
+    /// F_a, n x q: the effect of the faults on the states.
     #[serde(rename = "F_a")]
     pub f_a: Matrix,
     /// A_f, q x q; `None`: the faults are constant.
@@ -82,16 +82,16 @@ pub struct Design {
     pub p_f: Option<Matrix>,
     /// The sliding-mode law that estimates the faults; `None`: a linear law.
     pub sliding_mode: Option<SlidingMode>,
-    /// K_x, m x n.
+    /// K_x, m x n: the feedback of the estimated states.
     #[serde(rename = "K_x")]
     pub k_x: Matrix,
-    /// K_f, m x q.
+    /// K_f, m x q: the compensation of the estimated faults.
     #[serde(rename = "K_f")]
     pub k_f: Matrix,
-    /// L_x, n x p.
+    /// L_x, n x p: the observer gain of the states.
     #[serde(rename = "L_x")]
     pub l_x: Matrix,
-    /// L_f, q x p.
+    /// L_f, q x p: the observer gain of the faults.
     #[serde(rename = "L_f")]
     pub l_f: Matrix,
     /// H, t x p, of the integral action x_i' = r - H y + ...; see `fmu-controller/src/equations.rs`.

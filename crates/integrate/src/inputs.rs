@@ -10,7 +10,7 @@ pub(crate) const ORDERS: usize = 3;
 /// The continuous floating-point inputs of an instance.
 #[derive(Default)]
 pub(crate) struct Inputs {
-    /// Value references, ascending.
+    /// The value references of the inputs, ascending.
     references: Vec<u32>,
     /// The start values of the inputs in the description; 0 without a start value.
     starts: Vec<f64>,

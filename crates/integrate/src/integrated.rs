@@ -26,7 +26,7 @@ const INTEGRATION: &str = "the integration of the model-exchange FMU";
 /// Options of [`Integrated`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Options {
-    /// The method.
+    /// The integration method.
     pub method: Method,
 }
 
@@ -42,7 +42,7 @@ enum Mode {
 /// The state of the integration at the present time, except for the arrays of states, indicators and inputs.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Point {
-    /// The time in s.
+    /// The present time in s.
     time: f64,
     mode: Mode,
     /// The time of the next time event in s.

@@ -3,7 +3,7 @@
 /// The point from which a method steps.
 #[derive(Clone, Copy)]
 pub(crate) struct StepStart<'a> {
-    /// The time in s.
+    /// The time at the start in s.
     pub(crate) time: f64,
     pub(crate) states: &'a [f64],
     /// The derivative of the states.

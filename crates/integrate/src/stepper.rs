@@ -56,7 +56,7 @@ pub(crate) enum StepError {
     Call(CallError),
     /// The step would be too small.
     Size {
-        /// The step in s.
+        /// The size of the step in s.
         size: f64,
         /// The state with the largest error, or the first one without a finite value or derivative.
         state: usize,

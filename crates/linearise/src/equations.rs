@@ -222,7 +222,7 @@ impl PlantEquations {
         Ok(())
     }
 
-    /// Sets `rates` to f(t, x, u).
+    /// Sets `rates` to the derivatives of the states, f(t, x, u).
     pub fn rates(
         &mut self,
         time: f64,
@@ -235,7 +235,7 @@ impl PlantEquations {
         all_finite(&self.names.rows, rates)
     }
 
-    /// Sets `y` to h(t, x, u).
+    /// Sets `y` to the outputs h(t, x, u).
     pub fn outputs(
         &mut self,
         time: f64,

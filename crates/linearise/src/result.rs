@@ -19,18 +19,18 @@ pub struct Matrices {
     pub a: DMatrix<f64>,
     /// B, states x inputs.
     pub b: DMatrix<f64>,
-    /// F, states x faults.
+    /// F, states x faults: the effect of the faults on the states.
     pub f: DMatrix<f64>,
     /// C, outputs x states.
     pub c: DMatrix<f64>,
     /// D, outputs x inputs: the direct feedthrough.
     pub d: DMatrix<f64>,
-    /// G, outputs x faults.
+    /// G, outputs x faults: the effect of the faults on the outputs.
     pub g: DMatrix<f64>,
 }
 
 impl Matrices {
-    /// Returns [A, B, F; C, D, G].
+    /// Returns the matrices as one: [A, B, F; C, D, G].
     #[must_use]
     pub fn joined(&self) -> DMatrix<f64> {
         let Self { a, b, f, c, d, g } = self;
@@ -63,7 +63,7 @@ pub struct Signal {
 /// The method of a linearisation. `Display` writes it as a phrase for a report.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Method {
-    /// `fmi2GetDirectionalDerivative`.
+    /// Values of `fmi2GetDirectionalDerivative`.
     DirectionalDerivatives {
         /// The interface of the instance.
         interface: Interface,
@@ -108,7 +108,7 @@ pub struct Disagreement {
     pub of: String,
     /// The variable of differentiation.
     pub to: String,
-    /// The value of `fmi2GetDirectionalDerivative`.
+    /// The value that `fmi2GetDirectionalDerivative` returns.
     pub derivative: f64,
     /// The difference quotient, extrapolated.
     pub difference: f64,
@@ -119,7 +119,7 @@ pub struct Disagreement {
 /// A linearised FMU.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linearisation {
-    /// A, B, F, C, D, G.
+    /// The matrices A, B, F, C, D, G.
     pub matrices: Matrices,
     /// The states x with `x_0`.
     pub states: Vec<Signal>,

@@ -134,19 +134,19 @@ pub enum Progress {
     Matrix,
     /// The iteration has converged, `|G_i(u) - u_i| <= w_i`. `u_next` is not set.
     Converged {
-        /// Evaluations of G.
+        /// Number of evaluations of G.
         iterations: u32,
     },
     /// The iteration has not converged within the allowed number of evaluations.
     NotConverged {
-        /// Evaluations of G.
+        /// Number of evaluations of G.
         iterations: u32,
-        /// `max_i |G_i(u) - u_i| / w_i`, required to be at most 1.
+        /// The residual `max_i |G_i(u) - u_i| / w_i`, required to be at most 1.
         residual: f64,
     },
     /// A value of u or G(u) or the next step is not finite, or the residual exceeds 1e12 times the first one.
     Diverged {
-        /// Evaluations of G.
+        /// Number of evaluations of G.
         iterations: u32,
     },
     /// `I - dG/du` is numerically singular: the loop has no solution or no unique one.

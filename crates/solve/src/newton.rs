@@ -132,7 +132,7 @@ impl Newton {
         }
     }
 
-    /// Writes `u + s d` to `u_next`.
+    /// Writes the damped step `u + s d` to `u_next`.
     fn write_next(&self, u_next: &mut [f64]) -> Progress {
         for ((next, base), direction) in u_next.iter_mut().zip(&self.base).zip(&self.direction) {
             *next = base + self.part * direction;

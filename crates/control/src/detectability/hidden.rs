@@ -44,7 +44,7 @@ pub struct HiddenFault {
     pub at: Complex<f64>,
     /// Number of independent faults at s: columns of N, the eigenvectors of `A_f` for s.
     pub channels: usize,
-    /// Rank of R(s) = [A - s I, `F_a` N; C, 0].
+    /// Rank of the matrix R(s) = [A - s I, `F_a` N; C, 0].
     pub rank: usize,
     /// Number of columns of R(s). The fault is hidden because `rank` is lower.
     pub expected: usize,
@@ -123,7 +123,7 @@ fn eigenvectors(a_f: &DMatrix<f64>, s: Complex<f64>) -> Result<ComplexMatrix, Er
     Ok(ComplexMatrix::from_fn(q, null.len(), |i, j| null[j].1[i]))
 }
 
-/// R(s) = [A - s I, `F_a` N; C, 0].
+/// Builds the Rosenbrock matrix R(s) = [A - s I, `F_a` N; C, 0].
 fn rosenbrock_matrix(
     plant: &FaultyPlant,
     s: Complex<f64>,

@@ -116,7 +116,7 @@ pub(super) fn normal_density(x: f64) -> f64 {
 
 /// The probability that a chi-square variable is above x, updated as its degrees of freedom grow by two.
 struct Terms {
-    /// x / 2, above 0.
+    /// Half of the x at which the probability is computed, above 0.
     half: f64,
     /// The probability that a variable with the present degrees of freedom is above x.
     survival: f64,

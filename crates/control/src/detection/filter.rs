@@ -156,9 +156,9 @@ struct UnknownInputObserver {
     basis: DMatrix<f64>,
     /// Q' T, k x n: T in the coordinates of Q.
     projection: DMatrix<f64>,
-    /// H, n x p.
+    /// H, n x p, with T = I - H C.
     h: DMatrix<f64>,
-    /// N, rows x p.
+    /// N, rows x p: selects combinations of measurements that the inputs do not reach.
     selection: DMatrix<f64>,
 }
 

@@ -154,7 +154,7 @@ impl DirectForm {
         Ok(gain.transpose())
     }
 
-    /// T = [`M_1` C; N], n x n.
+    /// T = [`M_1` C; N], n x n: from x to the coordinates [`y_1`; w].
     #[must_use]
     pub fn coordinates(&self) -> &DMatrix<f64> {
         &self.to

@@ -19,7 +19,7 @@ const LARGEST: usize = 10_000;
 pub struct Record {
     /// u, m x N: a column for each sample.
     pub inputs: DMatrix<f64>,
-    /// y, p x N.
+    /// y, p x N: a column for each sample.
     pub outputs: DMatrix<f64>,
 }
 

@@ -19,19 +19,19 @@ use nalgebra::DMatrix;
 pub struct DisturbedPlant {
     /// A, n x n.
     pub a: DMatrix<f64>,
-    /// `B_u`, n x m.
+    /// `B_u`, n x m: the effect of the commands on the states.
     pub b_u: DMatrix<f64>,
-    /// `B_d`, n x (number of disturbances).
+    /// `B_d`, n x (number of disturbances): the effect of the disturbances on the states.
     pub b_d: DMatrix<f64>,
-    /// `B_f`, n x q.
+    /// `B_f`, n x q: the effect of the faults on the states.
     pub b_f: DMatrix<f64>,
     /// C, p x n.
     pub c: DMatrix<f64>,
-    /// `D_u`, p x m.
+    /// `D_u`, p x m: the effect of the commands on the measurements.
     pub d_u: DMatrix<f64>,
-    /// `D_d`, p x (number of disturbances).
+    /// `D_d`, p x (number of disturbances): the effect of the disturbances on the measurements.
     pub d_d: DMatrix<f64>,
-    /// `D_f`, p x q.
+    /// `D_f`, p x q: the effect of the faults on the measurements.
     pub d_f: DMatrix<f64>,
     /// Continuous or sampled time.
     pub domain: Domain,

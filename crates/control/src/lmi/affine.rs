@@ -16,7 +16,7 @@ pub struct Affine {
 }
 
 impl Affine {
-    /// A known matrix.
+    /// The expression of a known matrix, without unknowns.
     #[must_use]
     pub fn constant(m: &DMatrix<f64>) -> Self {
         Self { constant: m.clone(), terms: BTreeMap::new() }

@@ -8,8 +8,8 @@ use crate::zeros::{Zeros, zeros};
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// det H is evaluated at `POINTS` points s > 0 on each side of 1 / (least Re(-1 / s) of the region), `PER_DECADE` of
-/// them per decade.
+/// det H of [`disc_norm_lower_bound`] is evaluated at `POINTS` points s > 0 on each side of 1 / (least Re(-1 / s) of
+/// the region), `PER_DECADE` of them per decade.
 const POINTS: i32 = 60;
 const PER_DECADE: f64 = 20.0;
 /// Bisections for the sum of the inverse eigenvalues.

@@ -50,15 +50,15 @@ pub struct GainBound {
 
 /// The matrices from which the inequalities of a gain bound are built.
 pub(super) struct GainInequality {
-    /// P, n x n.
+    /// The matrix P of the Lyapunov function x' P x, n x n.
     pub(super) p: Affine,
-    /// P A, n x n.
+    /// P A, n x n, for the dynamics A of the system.
     pub(super) dynamics: Affine,
-    /// P B, n x k.
+    /// P B, n x k, for the input matrix B of the system.
     pub(super) input: Affine,
-    /// C, r x n.
+    /// The output matrix C, r x n.
     pub(super) output: Affine,
-    /// D, r x k.
+    /// The direct term D, r x k.
     pub(super) feedthrough: Affine,
     /// The bound in the inequalities: gamma for H-infinity, gamma^2 for the other norms.
     pub(super) level: Affine,

@@ -32,7 +32,7 @@ pub struct Disc {
 pub struct Region {
     /// Decay rate alpha above zero in 1/s: Re s < -alpha, or |z| < exp(-alpha period).
     pub decay: Option<f64>,
-    /// A disc, of s or of z.
+    /// A disc of the plane of s, or of z in sampled time.
     pub disc: Option<Disc>,
     /// Half angle in rad, above 0 and below pi/2, of the sector |Im s| < tan(angle) (-Re s):
     /// damping above cos(angle). In continuous time only.

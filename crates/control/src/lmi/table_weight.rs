@@ -23,7 +23,7 @@ type Quotient = (Vec<f64>, Vec<f64>);
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct TableWeight {
-    /// The weight.
+    /// The weight that is nearest to the table.
     pub weight: Weight,
     /// The largest factor between the magnitudes of the weight and of the table, at least 1.
     pub deviation: f64,

@@ -133,7 +133,7 @@ impl<'a> FeedbackLoop<'a> {
         [structure.condition(), structure.gain(), self.peak(structure)]
     }
 
-    /// (s I - M)^-1 N.
+    /// Computes (s I - M)^-1 N.
     fn resolvent(&self, s: Complex<f64>, n: &ComplexMatrix) -> ComplexMatrix {
         let mut solved = n.clone();
         let mut row = 0;
@@ -155,7 +155,7 @@ impl<'a> FeedbackLoop<'a> {
         solved
     }
 
-    /// I + G Z, with Z = (s I - M)^-1 V^-1 B.
+    /// S = I + G Z, with Z = (s I - M)^-1 V^-1 B.
     fn sensitivity(&self, structure: &Eigenstructure, z: &ComplexMatrix) -> ComplexMatrix {
         let m = self.b.ncols();
         let (re, im) =

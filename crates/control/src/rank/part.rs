@@ -18,7 +18,7 @@ pub struct ControllablePart {
     pub a: DMatrix<f64>,
     /// `B_1`, r x m: the effect of the inputs on the controllable part.
     pub b: DMatrix<f64>,
-    /// T, r x n.
+    /// T, r x n: from x to the states z of the controllable part.
     pub coordinates: DMatrix<f64>,
     /// V, n x r: its columns span the controllable subspace, T V = I.
     pub basis: DMatrix<f64>,

@@ -66,7 +66,7 @@ struct Lifted<'a> {
     states: usize,
     period: f64,
     part: f64,
-    /// e^(A i h) for i from 0 to N.
+    /// The state transition e^(A i h) over i parts, i from 0 to N.
     phi: Vec<DMatrix<f64>>,
     /// Integral of e^(A s) B over s from 0 to i h.
     gamma: Vec<DMatrix<f64>>,

@@ -68,7 +68,7 @@ pub fn energy(system: &StateSpace) -> Result<Energy, Error> {
     })
 }
 
-/// C W C', in sampled time C W C' + D D'.
+/// The covariance of z, C W C', in sampled time C W C' + D D', with W the covariance of the state.
 fn covariance(system: &StateSpace) -> Result<DMatrix<f64>, Error> {
     let StateSpace { a, b, c, d, domain } = system;
     let noise = symmetric_part(&(b * b.transpose()));

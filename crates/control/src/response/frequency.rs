@@ -143,7 +143,7 @@ impl Transfer {
         }
     }
 
-    /// G at one frequency.
+    /// The frequency response G at one frequency.
     pub(crate) fn gain(&self, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
         self.with_direct(self.without_direct(frequency)?)
     }
@@ -155,7 +155,7 @@ impl Transfer {
         Ok(&self.c * self.states(self.domain.point(frequency)))
     }
 
-    /// G from C (s I - A)^-1 B.
+    /// Adds the direct term: G from C (s I - A)^-1 B.
     pub(super) fn with_direct(
         &self,
         response: DMatrix<Complex<f64>>,

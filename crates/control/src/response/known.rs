@@ -53,7 +53,7 @@ impl KnownResponse {
         Ok(self)
     }
 
-    /// G at a frequency.
+    /// The frequency response G at one frequency.
     pub(crate) fn gain(&self, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
         match self.known.get(&frequency.to_bits()) {
             Some(response) => self.transfer.with_direct(response.clone()),

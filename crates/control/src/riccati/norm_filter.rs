@@ -24,11 +24,11 @@ pub struct NormFilterProblem<'a> {
     pub a: &'a DMatrix<f64>,
     /// C, p x n.
     pub c: &'a DMatrix<f64>,
-    /// B, n x k.
+    /// B, n x k: how w acts on the states.
     pub disturbance: &'a DMatrix<f64>,
     /// D, p x k, of full row rank: every measurement has noise.
     pub feedthrough: &'a DMatrix<f64>,
-    /// E, r x n.
+    /// E, r x n: z = E x is the estimated signal.
     pub output: &'a DMatrix<f64>,
 }
 

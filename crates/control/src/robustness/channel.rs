@@ -91,12 +91,12 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
     Ok(ChannelMargins { gain, phase, phase_frequency, delay })
 }
 
-/// L = T / (1 - T).
+/// The loop transfer L = T / (1 - T).
 fn loop_transfer(t: Complex<f64>) -> Complex<f64> {
     t / (Complex::new(1.0, 0.0) - t)
 }
 
-/// |L|, infinite at a pole of L.
+/// The modulus of L; infinite at a pole of L.
 fn modulus(t: Complex<f64>) -> f64 {
     t.norm() / (Complex::new(1.0, 0.0) - t).norm()
 }

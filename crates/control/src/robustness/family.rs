@@ -53,7 +53,7 @@ pub struct ToleranceCase {
 
 /// The steps of [`super::tolerance_test`], with its errors, for a caller that runs cases and climbs in parallel.
 pub struct ToleranceSearch<'a, F> {
-    /// The plants.
+    /// The plants that may be in the loop.
     pub family: &'a F,
     /// The controller, which does not vary.
     pub controller: &'a StateSpace,

@@ -23,7 +23,7 @@ pub struct UltimateBound {
     pub peaks: DVector<f64>,
     /// lambda, in 1/s: V - `bound^2` decreases at least as fast as exp(-lambda t).
     pub rate: f64,
-    /// Q, n x n: the ellipsoid is z' `Q^-1` z <= `bound^2`.
+    /// Q, n x n: the shape of the ellipsoid z' `Q^-1` z <= `bound^2`.
     pub shape: DMatrix<f64>,
     /// Smallest eigenvalue of Q and of the inequality, each scaled to a diagonal of about one; larger
     /// than the rounding errors.

@@ -14,7 +14,7 @@ const DOUBLE: f64 = 1e-8;
 /// The feedforward `N_r` beside integral action, and the eigenvalues that references do not excite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IntegralFeedforward {
-    /// `N_r`, m x t.
+    /// The feedforward `N_r`, m x t.
     pub gain: DMatrix<f64>,
     /// The t slowest eigenvalues of the feedback, which no reference excites.
     pub silent: Vec<Complex<f64>>,
@@ -67,7 +67,7 @@ pub fn integral_feedforward(
     of_controllable(&controlled, &part.b, t, domain)
 }
 
-/// `A_e` + `B_e` K.
+/// The dynamics `A_e` + `B_e` K of the loop with integrals.
 fn closed_loop(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

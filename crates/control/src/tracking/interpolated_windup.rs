@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 
 /// The largest number of commands with limits, because every set of these commands is examined.
 const COMMANDS: usize = 10;
-/// Bisections of an interval.
+/// Largest number of successive bisections of an interval.
 const BISECTIONS: usize = 12;
 /// Singular values of the gains below this, relative to the largest, count as zero.
 const TOLERANCE: f64 = 1e-9;

@@ -35,7 +35,7 @@ pub(super) struct Place {
     pub(super) node: usize,
 }
 
-/// K, S and H G at a frequency.
+/// K, S and H G of a loop at one frequency.
 struct ClosedLoop {
     /// K, the gain from the measurements to the commands.
     k: ComplexMatrix,

@@ -11,9 +11,9 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) struct Nulling {
     /// S, s x s, whose eigenvalues are the invariant zeros.
     pub(crate) dynamics: DMatrix<f64>,
-    /// W, k x s.
+    /// W, k x s, of the inputs w = W v.
     pub(crate) input: DMatrix<f64>,
-    /// Z, r x s.
+    /// Z, r x s, of the outputs z = Z v.
     pub(crate) output: DMatrix<f64>,
     /// The size of the rounding errors of the dynamics S.
     pub(crate) rounding: f64,

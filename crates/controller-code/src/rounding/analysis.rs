@@ -207,12 +207,12 @@ impl<'a> Analysis<'a> {
         unit
     }
 
-    /// |e| <= |y - D u| + |C| |x_hat|.
+    /// A bound of the innovation: |e| <= |y - D u| + |C| |x_hat|.
     fn innovation(&self, x_hat: &DMatrix<f64>) -> DMatrix<f64> {
         self.measured() + self.controller.c.abs() * x_hat
     }
 
-    /// |y - D u| <= |y| + |D| |u|; y without D.
+    /// A bound of the measurements without feedthrough: |y - D u| <= |y| + |D| |u|; y without D.
     fn measured(&self) -> DMatrix<f64> {
         let y = self.unit(Kind::Measurement);
         match &self.controller.d {
@@ -221,7 +221,8 @@ impl<'a> Analysis<'a> {
         }
     }
 
-    /// |f_hat_i| <= |f_hat| + |P_f| |e| with a direct term, else |f_hat|.
+    /// A bound of the integral part of the fault estimates: |f_hat_i| <= |f_hat| + |P_f| |e| with a direct term, else
+    /// |f_hat|.
     fn integral_part(&self) -> DMatrix<f64> {
         let f_hat = self.unit(Kind::Fault);
         match &self.controller.p_f {
@@ -230,7 +231,7 @@ impl<'a> Analysis<'a> {
         }
     }
 
-    /// |r| <= |C| |x_r| + |D_u| |u| + |D_y| |y|, residuals x signals.
+    /// A bound of the residuals, residuals x signals: |r| <= |C| |x_r| + |D_u| |u| + |D_y| |y|.
     fn residual_magnitude(&self) -> DMatrix<f64> {
         let Some(detection) = &self.controller.detection else {
             return DMatrix::zeros(0, self.widths().signals);

@@ -25,19 +25,19 @@ pub struct DetectionDesign {
     /// A, k x k.
     #[serde(rename = "A")]
     pub a: Matrix,
-    /// B_u, k x m.
+    /// B_u, k x m: the effect of the commands on x_r.
     #[serde(rename = "B_u")]
     pub b_u: Matrix,
-    /// B_y, k x p.
+    /// B_y, k x p: the effect of the measurements on x_r.
     #[serde(rename = "B_y")]
     pub b_y: Matrix,
     /// C, rows x k.
     #[serde(rename = "C")]
     pub c: Matrix,
-    /// D_u, rows x m.
+    /// D_u, rows x m: the effect of the commands on r.
     #[serde(rename = "D_u")]
     pub d_u: Matrix,
-    /// D_y, rows x p.
+    /// D_y, rows x p: the effect of the measurements on r.
     #[serde(rename = "D_y")]
     pub d_y: Matrix,
     /// Maps the initial estimate of the states to the initial x_r, k x n.

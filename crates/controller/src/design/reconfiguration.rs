@@ -18,7 +18,7 @@ pub struct Reconfiguration {
     /// K_x, m x n. `None`, like K_f and K_s, if only the fall-back serves this case.
     #[serde(rename = "K_x")]
     pub k_x: Option<Matrix>,
-    /// K_f, m x q.
+    /// K_f, m x q: the compensation of the estimated faults.
     #[serde(rename = "K_f")]
     pub k_f: Option<Matrix>,
     /// K_s, m numbers: the gains from the stuck command to the commands.
@@ -46,10 +46,10 @@ pub struct Combination {
     /// Bit j: actuator j is gone; set when the file is read.
     #[serde(default)]
     pub mask: u64,
-    /// K_x, m x n.
+    /// K_x, m x n: the feedback of the estimated states.
     #[serde(rename = "K_x")]
     pub k_x: Matrix,
-    /// K_f, m x q.
+    /// K_f, m x q: the compensation of the estimated faults.
     #[serde(rename = "K_f")]
     pub k_f: Matrix,
     /// K_s, m x (the number of actuators that are gone), columns in the order of `gone`.
@@ -61,7 +61,7 @@ pub struct Combination {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fallback {
-    /// K_x, m x n.
+    /// K_x, m x n: the feedback of the estimated states.
     #[serde(rename = "K_x")]
     pub k_x: Matrix,
     /// K_f, m x q; `None`: the estimated faults are not compensated.

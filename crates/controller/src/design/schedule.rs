@@ -1,4 +1,4 @@
-//! The table `[schedule]`.
+//! The table `[schedule]` of a design file: matrices and operating points at the points of a grid.
 
 use serde::{Deserialize, Serialize};
 

@@ -33,7 +33,7 @@ pub(super) struct Point {
 
 /// A linear matrix inequality F = N* W N > 0 at a point.
 struct Inequality {
-    /// K = N F^-1 N*.
+    /// K = N F^-1 N*, from which the derivatives of log det F follow.
     k: ComplexMatrix,
     /// Whether K has no entries between different blocks.
     diagonal: bool,
@@ -47,7 +47,7 @@ impl<'a> Barrier<'a> {
         Self { m, directions: directions(blocks), largest_g: LARGEST_G * size }
     }
 
-    /// D = I / 2, G = 0.
+    /// The point D = I / 2, G = 0, from which Newton's method starts.
     pub(super) fn start(&self) -> Point {
         let half = |direction: &Direction| {
             let diagonal = direction.entries.iter().all(|(row, column, _)| row == column);

@@ -21,11 +21,11 @@ const LEAST: f64 = 1e-4;
 pub(super) struct HeldFamily<'a> {
     controller: &'a StateSpace,
     period: f64,
-    /// [A, B; 0, 0] of the plant.
+    /// The matrix [A, B; 0, 0] of the plant.
     z: DMatrix<f64>,
-    /// The changes of [A, B; 0, 0].
+    /// The changes of [A, B; 0, 0] by the deviations.
     on_states: Channels,
-    /// The changes of [C, D].
+    /// The changes of [C, D] by the deviations.
     on_outputs: Channels,
     /// The sum of the moduli of the changes of [A, B; 0, 0], entry by entry.
     size: DMatrix<f64>,

@@ -27,7 +27,7 @@ impl Response {
         Self { system: system.balanced(), transfer }
     }
 
-    /// M at j w; D at an infinite frequency.
+    /// M at s = j w; D at an infinite frequency.
     pub(super) fn at(&self, frequency: f64) -> Result<ComplexMatrix, Error> {
         if frequency.is_infinite() {
             return Ok(to_complex(&self.system.d));
