@@ -35,7 +35,7 @@ const HYSTERESIS: f64 = 1e-9;
 #[derive(Clone, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that are independent")]
 pub struct AsoController {
-    /// Copied when a parameter is changed, but not with each FMU state.
+    /// The design, which is copied when a parameter is changed, but not with each FMU state.
     pub(crate) design: Shared<Design>,
     pub(crate) x_hat_0: Vec<f64>,
     pub(crate) f_hat_0: Vec<f64>,
@@ -52,28 +52,28 @@ pub struct AsoController {
     pub(crate) f_slopes: Vec<f64>,
     /// u', the derivative of the commands.
     pub(crate) u_slopes: Vec<f64>,
-    /// Whether the derivatives z', f_hat', u' and E_hat' are those at `deviations` and `mode`.
+    /// Whether the derivatives z', f_hat', u' and E_hat' belong to the present `deviations` and `mode`.
     #[serde(skip)]
     has_slopes: bool,
     pub(crate) compensate: bool,
     /// The estimated losses of effectiveness E_hat with their derivatives.
     pub(crate) losses: Vec<Loss>,
-    /// Which actuators are gone.
+    /// The decision on which actuators are gone.
     pub(crate) reconfigurator: Reconfigurator,
-    /// The mode for which u and z' are computed. Whether it compensates is decided at the start, at the end of
+    /// The mode for which u and z' are computed. Whether the mode compensates is decided at the start, at the end of
     /// each step and at events; in a sampled controller at each sample.
     mode: Mode,
     /// Whether a channel reaches or leaves a limit at events only, as in model exchange.
     frozen: bool,
-    /// `None` for a continuous controller.
+    /// The samples; `None` for a continuous controller.
     sampler: Option<Sampler>,
-    /// `None` without a detection of faults.
+    /// The detection of faults; `None` without one.
     detector: Option<Detector>,
     /// The measurements that the importer sets; `values` has the measurements that are used. `None` if all are used.
     measurement_check: Option<MeasurementCheck>,
     /// The clock variable, which the importer ticks. The controller finds its samples by time, not by this clock.
     pub(crate) sample_clock: bool,
-    /// The design at the scheduling variable of the last sample, or of now in a continuous controller; `None`
+    /// The design at the scheduling variable of the last sample, in a continuous controller of the present time; `None`
     /// without a schedule.
     current: Option<Box<Design>>,
     /// The scheduling variable and its slope, if the variable is an input.
@@ -89,7 +89,7 @@ pub struct AsoController {
     /// Whether a value outside of the schedule was reported.
     outside_reported: bool,
     log: Log,
-    /// Made from `design` in the first step, and again after a state was read from bytes.
+    /// The observer, created from `design` in the first step, and again after a state was read from bytes.
     #[serde(skip)]
     observer: Option<Observer>,
     /// Buffer for the time derivatives of the interpolated design and of the signals.

@@ -26,7 +26,7 @@ fn x_hat(design: &Design) -> Vec<String> {
     channels("x_hat", design.states.len()).collect()
 }
 
-/// The part of z that estimates the faults.
+/// The names of the fault estimates in z.
 fn f_hat(design: &Design) -> Vec<String> {
     names::fault_states(design).collect()
 }
@@ -308,8 +308,8 @@ pub(crate) fn of_initial_command(design: &Design, j: usize) -> Vec<String> {
     by_schedule(design, names)
 }
 
-/// Same as [`groups_by_validity`] without a schedule; with one, a single group of nonlinear dependencies, with all
-/// names and the scheduling variable.
+/// Same as [`groups_by_validity`] without a schedule. With a schedule, a single group of nonlinear dependencies with
+/// all names and the scheduling variable.
 pub(crate) fn groups_by_schedule(design: &Design, groups: Vec<Group>) -> Vec<Group> {
     if design.schedule.is_none() {
         return groups_by_validity(design, groups);

@@ -153,7 +153,7 @@ impl Detector {
         }
     }
 
-    /// Advances the filter over a part of a step of a continuous controller, and takes the samples in it.
+    /// Advances the filter over a part of a step of a continuous controller, and takes the samples in this part.
     pub(crate) fn follow(
         &mut self,
         design: &Design,

@@ -25,12 +25,12 @@ pub(crate) struct MeasurementCheck {
     /// The measurements and their derivatives with respect to time.
     pub(crate) y: Vec<f64>,
     pub(crate) y_slopes: Vec<f64>,
-    /// The smallest and the largest values that are used.
+    /// The smallest and the largest valid values.
     low: Vec<f64>,
     high: Vec<f64>,
-    /// The last values that were used.
+    /// For each measurement the last value that was used.
     last: Vec<f64>,
-    /// The values at a sample.
+    /// The measurements at a sample.
     sampled: Vec<f64>,
     /// The number of samples for which a sampled controller has used the last value, and the most for which it may.
     held: Vec<u32>,

@@ -227,7 +227,7 @@ enum Position {
 /// their derivatives.
 const POINTS: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
 const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
-/// The fraction of an integration step to which state events are located.
+/// Width to which state events are located, as a fraction of an integration step.
 const EVENT_WIDTH: f64 = 1e-9;
 /// The largest number of state events in an integration step.
 const MOST_EVENTS: usize = 1000;

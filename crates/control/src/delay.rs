@@ -297,7 +297,7 @@ impl Delays {
     }
 }
 
-/// Discretises a path with a delay; returns the sampled path without its lag, a whole number of samples, and the lag in
+/// Discretises a path with a delay; returns the sampled path without the whole samples of its lag, and these samples in
 /// s.
 fn sampled_path(path: &StateSpace, delay: f64, period: f64) -> Result<(StateSpace, f64), Error> {
     check::positive("the sample time", period)?;

@@ -35,15 +35,15 @@ pub enum FaultKind {
     Ramp,
 }
 
-/// Where a fault enters.
+/// The signals that a fault acts on.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum FaultEntry {
-    /// In the states, x' = A x + B u + column f; n entries.
+    /// The states, x' = A x + B u + column f; n entries.
     Actuator(DVector<f64>),
-    /// In the measurements, y = C x + column f; p entries.
+    /// The measurements, y = C x + column f; p entries.
     Sensor(DVector<f64>),
-    /// In states and measurements, x' = A x + B u + `states` f, y = C x + `measurements` f; n and p entries.
+    /// States and measurements, x' = A x + B u + `states` f, y = C x + `measurements` f; n and p entries.
     Both {
         /// The column of `F_a`: the effect on the states.
         states: DVector<f64>,

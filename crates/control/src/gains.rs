@@ -6,7 +6,7 @@ use crate::tracking::IntegralAction;
 use crate::{Error, check};
 use nalgebra::DMatrix;
 
-/// How the observer uses the newest measurement.
+/// The way in which the observer uses the newest measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
     /// The measurement corrects the derivative of the estimate, in sampled time the next estimate.
@@ -30,7 +30,7 @@ pub enum Estimator {
 /// not change the error dynamics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gains {
-    /// How the observer uses the newest measurement.
+    /// The way in which the observer uses the newest measurement.
     pub estimator: Estimator,
     /// `K_x`, m x n: the feedback of the estimated states.
     pub k_x: DMatrix<f64>,

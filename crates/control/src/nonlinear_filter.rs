@@ -49,7 +49,7 @@ pub trait SampledPlant {
     ) -> Result<(), Self::Error>;
 }
 
-/// How mean and covariance are transformed by the equations of the plant.
+/// The method by which the equations of the plant transform mean and covariance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transform {
     /// By the tangents of the equations at the mean (extended Kalman filter).

@@ -196,7 +196,7 @@ pub(crate) enum Coordinates<'a> {
     Given,
     /// Coordinates that balance A + B K, with the K found in the coordinates of A.
     Balanced,
-    /// x = S z with the diagonal S.
+    /// The coordinates z of x = S z, with the given diagonal of S.
     Scaled(&'a DVector<f64>),
 }
 

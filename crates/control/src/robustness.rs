@@ -62,7 +62,7 @@ use crate::blocks::{beside, block_2x2, stacked};
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// Where the loop is opened.
+/// The point at which the loop is opened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Point {
     /// The loop is opened at the commands.

@@ -62,8 +62,8 @@ pub(super) fn dense(matrix: &aso_controller::Matrix) -> DMatrix<f64> {
     DMatrix::from_row_slice(matrix.rows, matrix.columns, &matrix.values)
 }
 
-/// The number of the first sample at or after `start` in s, the value of the entry called `name`, with the tolerance of
-/// the FMU; sample 0 is at time 0. An error if the number needs more than 32 bits.
+/// The number of the first sample at or after the time `start` in s, with the tolerance of the FMU; sample 0 is at time
+/// 0. An error, which calls the time `name`, if the number needs more than 32 bits.
 pub(super) fn first_at(name: &str, start: f64, period: f64) -> Result<u32, Error> {
     let is_reached = |sample: f64| {
         let time = sample * period;

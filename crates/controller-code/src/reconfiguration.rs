@@ -15,7 +15,7 @@ pub(super) struct Reconfiguration {
     pub(super) cases: Vec<Case>,
     /// The gains, first those of the intact plant, last the fall-back, if there is one.
     pub(super) sets: Vec<GainSet>,
-    /// `None` without a fall-back, else whether it compensates faults.
+    /// Whether the fall-back compensates faults; `None` without a fall-back.
     pub(super) fallback: Option<bool>,
 }
 

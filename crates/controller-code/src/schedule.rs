@@ -37,7 +37,7 @@ pub(super) struct Point {
 }
 
 impl Schedule {
-    /// The schedule of a design file with these measurements.
+    /// The schedule of a design file whose measurements are `measurements`.
     pub(super) fn of(file: schedule::Schedule, measurements: &[design::Measurement]) -> Self {
         let schedule::Schedule { variable, unit, description, points } = file;
         let measurement = measurements.iter().position(|signal| signal.name == variable);

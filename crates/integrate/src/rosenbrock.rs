@@ -71,7 +71,7 @@ pub(crate) struct Rosenbrock {
     /// The increments of the six stages.
     increments: [Vec<f64>; 6],
     argument: Vec<f64>,
-    /// The right-hand side of a stage, then its increment.
+    /// The right-hand side of a stage, then the increment of the stage.
     slope: Vec<f64>,
     /// The Jacobian, column by column.
     jacobian: Vec<f64>,

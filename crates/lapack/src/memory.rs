@@ -64,7 +64,8 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// None when a size is negative, or when the leading dimension is below one or shorter than a column.
+    /// Creates the layout; None when a size is negative, or when the leading dimension is below one or shorter than a
+    /// column.
     pub(crate) fn new(rows: i32, cols: i32, leading: i32) -> Option<Self> {
         let (rows, cols) = (usize::try_from(rows).ok()?, usize::try_from(cols).ok()?);
         let step = usize::try_from(leading).ok()?;
@@ -112,7 +113,7 @@ pub(crate) struct Vector<P> {
 }
 
 impl<P> Vector<P> {
-    /// None when the length is negative or the increment zero.
+    /// Creates the argument; None when the length is negative or the increment zero.
     pub(crate) fn new(data: P, length: i32, increment: i32) -> Option<Self> {
         let length = usize::try_from(length).ok()?;
         (increment != 0).then_some(Self { data, length, increment })

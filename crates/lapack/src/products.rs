@@ -47,7 +47,7 @@ impl<T: Number> Operand<T> {
 pub(crate) struct Target<T> {
     pub(crate) data: *mut T,
     pub(crate) leading: i32,
-    /// None for an illegal UPLO.
+    /// The part that is written; None for an illegal UPLO.
     pub(crate) part: Option<Part>,
     pub(crate) alpha: T,
     pub(crate) beta: T,

@@ -166,8 +166,8 @@ pub trait Solver: Send {
     /// otherwise `u_next` has no defined value. All three slices have the length of the [`Scale`].
     fn next(&mut self, u: &[f64], g: &[f64], u_next: &mut [f64]) -> Progress;
 
-    /// Sets column `column` of `dG/du`, the derivative of G with respect to this component of u.
-    /// Call it only after [`Progress::Matrix`]; a solver that never requests the matrix ignores it.
+    /// Sets column `column` of `dG/du`, the derivative of G with respect to component `column` of u. Call it only after
+    /// [`Progress::Matrix`]; a solver that never requests the matrix ignores it.
     fn set_column(&mut self, column: usize, values: &[f64]) {
         let _ = (column, values);
     }

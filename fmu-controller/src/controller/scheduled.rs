@@ -72,7 +72,8 @@ impl AsoController {
         current.take_parameters(design);
     }
 
-    /// The design at the scheduling variable of the last sample, or of now; without a schedule the design itself.
+    /// The design at the scheduling variable of the last sample or of the present time; without a schedule the design
+    /// itself.
     pub(super) fn design_in_force(&self) -> &Design {
         self.current.as_deref().unwrap_or(&self.design)
     }

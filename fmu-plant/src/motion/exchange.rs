@@ -28,8 +28,8 @@ const REST: f64 = 1e-8 * NOMINAL_VELOCITY;
 /// importer may locate the stop a little too early.
 const LANDING: f64 = 10.0 * REST;
 
-/// How far the force on a held cart exceeds the static friction at its break-away, as a fraction of the
-/// static friction: more than an importer's integration errors, which would free the cart at once.
+/// The excess of the force on a held cart over the static friction at its break-away, as a fraction of the static
+/// friction: more than an importer's integration errors, which would free the cart at once.
 const EXCESS: f64 = 1e-6;
 
 /// The excess in N without static friction, so that a force of zero is no event.

@@ -40,7 +40,7 @@ type ComplexVector = DVector<Complex<f64>>;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct HiddenFault {
-    /// s: fault and motion develop as e^(s t), or s^k in sampled time. An eigenvalue of `A_f`.
+    /// The s of the fault and the motion, which develop as e^(s t) or in sampled time as s^k: an eigenvalue of `A_f`.
     pub at: Complex<f64>,
     /// Number of independent faults at s: columns of N, the eigenvectors of `A_f` for s.
     pub channels: usize,

@@ -17,7 +17,7 @@ pub struct MeasuredStates {
     pub change: DMatrix<f64>,
     /// The inverse T^-1.
     pub inverse: DMatrix<f64>,
-    /// The measurements, from 0, whose rates without the commands, `C[i] A x`, are the further states.
+    /// The measurements i, from 0, whose rates without commands, `C[i] A x`, are the remaining states.
     pub rates: Vec<usize>,
 }
 

@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector};
 const RELAXED_BOUND: f64 = 1.05;
 /// The bound of norm(P L) for which a gain is designed, relative to the smallest bound.
 pub(super) const RELAXED_GAIN: f64 = 2.0;
-/// How often the coordinates are refined before a search ends without an answer.
+/// Largest number of refinements of the coordinates before a search ends without an answer.
 pub(super) const REFINEMENTS: usize = 3;
 /// Bound of P and of norm(P L) in the solver's coordinates when a performance is required.
 const LARGEST: f64 = 1e6;
@@ -33,7 +33,7 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// The candidate K = -L' for the transposed system.
+    /// The candidate of the transposed system, K = -L'.
     pub(super) fn transposed(&self) -> Self {
         Self { gain: -self.gain.transpose(), coordinates: self.coordinates.transposed() }
     }

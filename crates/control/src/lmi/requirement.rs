@@ -12,8 +12,8 @@ pub struct Performance {
     pub disturbance: DMatrix<f64>,
     /// r x n: the part of z that depends on the states.
     pub output: DMatrix<f64>,
-    /// How w acts on the measurement (p x k, for an observer), or the command on z (r x m, for a
-    /// state feedback).
+    /// The effect of w on the measurement (p x k, for an observer), or of the command on z (r x m, for a state
+    /// feedback).
     pub feedthrough: DMatrix<f64>,
     /// The norm to bound.
     pub norm: Norm,

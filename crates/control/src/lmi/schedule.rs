@@ -26,8 +26,8 @@ const BISECTIONS: usize = 3;
 pub struct Interval {
     /// Length of the interval, above 0, in the unit of theta.
     pub length: f64,
-    /// The Bernstein coefficients `A_0` to `A_d`, n x n; see [`bernstein`]. A(t) is in their convex
-    /// hull.
+    /// The Bernstein coefficients `A_0` to `A_d`, n x n; see [`bernstein`]. A(t) is in the convex hull of the
+    /// coefficients.
     pub coefficients: Vec<DMatrix<f64>>,
 }
 

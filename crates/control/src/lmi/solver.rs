@@ -13,7 +13,7 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-/// How the solver ended.
+/// The state in which the solver ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
     /// The tolerances of the solver were met, or almost.

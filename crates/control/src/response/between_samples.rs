@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 pub struct SampledLoop<'a> {
     /// The plant in continuous time.
     pub extended: &'a ExtendedPlant,
-    /// The same plant, sampled by [`crate::sampled::sample`].
+    /// The plant of `extended`, sampled by [`crate::sampled::sample`].
     pub plant: &'a FaultyPlant,
     /// The gains, designed for `plant`.
     pub gains: &'a Gains,

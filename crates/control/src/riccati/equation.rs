@@ -61,7 +61,7 @@ impl RiccatiEquation {
         self.relative_residual(p, &sizes(p), FLOOR)
     }
 
-    /// The residual with `size` for |P| and each sum at least `floor` times the largest one.
+    /// The residual with `size` in place of |P|, where a sum counts as at least `floor` times the largest sum.
     fn relative_residual(&self, p: &DMatrix<f64>, size: &DMatrix<f64>, floor: f64) -> f64 {
         let Some(gain) = self.gain(p) else { return f64::INFINITY };
         let left = self.left_side(p, &gain);

@@ -27,7 +27,7 @@ pub struct PeakDerivatives {
 /// A peak of S whose derivatives are computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensitivityPeak {
-    /// Where the loop is opened.
+    /// The point at which the loop is opened.
     pub point: Point,
     /// The frequency of the peak, in rad/s.
     pub frequency: f64,

@@ -166,7 +166,8 @@ impl Search<'_> {
         None
     }
 
-    /// Values and gradients of `iterate` at `places`, with respect to its `parameters` in units of `scales`.
+    /// Weighted singular values of `iterate` at `places`, and their gradients with respect to `parameters` in units of
+    /// `scales`.
     fn cuts(
         &self,
         iterate: &Iterate,

@@ -27,7 +27,7 @@ pub struct Structure<'a> {
     pub a: &'a DMatrix<f64>,
     /// B, n x m.
     pub b: &'a DMatrix<f64>,
-    /// The rows and columns, from zero, of the entries of K, m x n.
+    /// Row and column, from zero, of each entry of K, m x n, that may differ from zero.
     pub free: &'a [(usize, usize)],
     /// The time domain of A and B.
     pub domain: Domain,

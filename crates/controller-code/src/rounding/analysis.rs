@@ -30,7 +30,7 @@ pub(super) struct Analysis<'a> {
 struct Chord {
     /// The position of the row of v in `errors`; the row is zero.
     position: usize,
-    /// Half of the largest slope of a chord, rho / (2 delta).
+    /// Half of the largest slope of a chord of the law, rho / (2 delta).
     half_slope: f64,
 }
 

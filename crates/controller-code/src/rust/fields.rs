@@ -38,8 +38,8 @@ impl Source<'_> {
         all
     }
 
-    /// The counters of the samples for which the last values of measurements are used, and of the samples since the
-    /// controller rested.
+    /// The counters of samples: for each measurement, while its last value replaces it; for the controller, since it
+    /// rested.
     fn fields_of_measurements(&self) -> Vec<Field> {
         let held = field("held", "[u32; MEASUREMENTS]", "[0; MEASUREMENTS]");
         let running = field("running", "u32", "0");

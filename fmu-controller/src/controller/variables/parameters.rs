@@ -61,7 +61,7 @@ pub(super) fn of(design: &Design) -> Vec<Variable> {
     all
 }
 
-/// `t_on` and `monitor`, and the sample time of a sampled controller.
+/// The parameters `t_on` and `monitor`, and the sample time of a sampled controller.
 fn switches(design: &Design) -> Vec<Variable> {
     let text = "Compensation starts at this time";
     let mut all = vec![

@@ -29,7 +29,7 @@ pub(super) struct Cover<'a> {
     gaps: Vec<Interval>,
     /// Frequencies at which scales are searched next, the last one first.
     candidates: Vec<f64>,
-    /// The frequencies between which the response changes most.
+    /// The slowest and the fastest frequency between which the response changes most.
     slowest: f64,
     fastest: f64,
 }
