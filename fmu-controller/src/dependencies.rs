@@ -1,9 +1,8 @@
 //! The dependencies of commands, estimates and derivatives: `ModelStructure` of the controller.
 //!
-//! All matrices are parameters, so every element is a dependency, also one that is zero in the design.
-//! Compensation and estimation are switched at events (in co-simulation: in steps), so at a point in
-//! time nothing depends on `compensate` or `time`. A command with limits is not linear in what it
-//! depends on.
+//! All matrices are parameters, so every element is a dependency, also one that is zero in the design. Compensation and
+//! estimation are switched at events (in co-simulation: in steps), so at a point in time nothing depends on
+//! `compensate` or `time`. A command with limits is not linear in what it depends on.
 //!
 //! In a continuous controller with a schedule all unknowns except y_f' and u_t' also depend on the scheduling
 //! variable, with which the gains change.

@@ -50,9 +50,8 @@
 //! All signals, limits included, are deviations from the operating point, which is
 //! zero where the design states none. A sampled controller has the same terms (`sampled.rs`).
 //!
-//! Everything else follows from these functions: the matrices of the exact step (`observer.rs`) are
-//! their values at unit vectors, the directional derivatives are their values for dual numbers, and
-//! u' is the command at z'.
+//! Everything else follows from these functions: the matrices of the exact step (`observer.rs`) are their values at
+//! unit vectors, the directional derivatives are their values for dual numbers, and u' is the command at z'.
 
 use crate::mode::Mode;
 use crate::number::Number;

@@ -69,9 +69,8 @@ impl Force {
 /// The linearised body has `sin theta -> theta`, `cos theta -> 1`, `theta'² sin theta -> 0`; its
 /// state matrices are the paper's `A` and `B`.
 ///
-/// Method: the 2 x 2 mass matrix is inverted in closed form; its determinant
-/// `(M + m) J - (m l cos theta)²` is positive for checked parameters.
-/// Source: Patton and Klinkhieo (2009), equation (20).
+/// Method: the 2 x 2 mass matrix is inverted in closed form; its determinant `(M + m) J - (m l cos theta)²` is positive
+/// for checked parameters. Source: Patton and Klinkhieo (2009), equation (20).
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RigidBody<D = f64> {
     total_mass: D,

@@ -9,11 +9,10 @@
 //! u      = K_x x_hat + K_f f_hat                              (2)
 //! ```
 //!
-//! The paper treats constant faults, `A_f` = 0; [`crate::faults`] builds other fault models f' =
-//! `A_f` f. The general form holds for every command u that the actuator applies. If u is (2)
-//! without saturation and B `K_f` = -`F_a`, the two terms with `f_hat` cancel and (4) is obtained
-//! as printed. The estimation error e = x - `x_hat` follows (9) to (11) in both cases, with `F_a`
-//! in place of -B `K_f`:
+//! The paper treats constant faults, `A_f` = 0; [`crate::faults`] builds other fault models f' = `A_f` f. The general
+//! form holds for every command u that the actuator applies. If u is (2) without saturation and B `K_f` = -`F_a`, the
+//! two terms with `f_hat` cancel and (4) is obtained as printed. The estimation error e = x - `x_hat` follows (9) to
+//! (11) in both cases, with `F_a` in place of -B `K_f`:
 //!
 //! ```text
 //! [e; f_hat]' = (A_0 - L C_0) [e; f_hat] - F_0 f_a
@@ -27,8 +26,7 @@
 //! [e; eps]' = (A_0 - L C_0) [e; eps] - [0; f' - A_f f]
 //! ```
 //!
-//! In sampled time the same equations hold with x[k+1], f[k+1] for x', f'; constant faults have
-//! `A_f` = I.
+//! In sampled time the same equations hold with x[k+1], f[k+1] for x', f'; constant faults have `A_f` = I.
 
 pub use crate::faulty_plant::FaultyPlant;
 pub use crate::gains::{Estimator, Gains};

@@ -7,8 +7,7 @@ use crate::tracking::integration;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// The observer and the feedback of [`crate::aso`] as one system from the measurement y to the
-/// command u.
+/// The observer and the feedback of [`crate::aso`] as one system from the measurement y to the command u.
 ///
 /// ```text
 /// z' = A z + B y,  u = C z + D y,  z = [x_hat; f_hat]; z[k+1] for z' in sampled time

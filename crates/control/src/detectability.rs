@@ -111,12 +111,11 @@ pub fn detectability(plant: &FaultyPlant, domain: Domain) -> Result<Detectabilit
 impl FaultyPlant {
     /// Checks that (`A_0`, `C_0`) is observable: an augmented observer with arbitrary eigenvalues exists.
     ///
-    /// Equivalent conditions: (A, C) is observable, and at every eigenvalue s of `A_f`, with
-    /// eigenvectors in the columns of N, the matrix [A - s I, `F_a` N; C, 0] has full column rank.
-    /// The measurements then distinguish a fault that develops as e^(s t) from every motion of the
-    /// states. For constant and ramp faults s = 0, or 1 in sampled time. There must be at least as
-    /// many measurements as N has columns. Singular values below 1e-12 of the largest count as
-    /// zero, rows and columns scaled to length one. [`detectability`] returns the hidden faults.
+    /// Equivalent conditions: (A, C) is observable, and at every eigenvalue s of `A_f`, with eigenvectors in the
+    /// columns of N, the matrix [A - s I, `F_a` N; C, 0] has full column rank. The measurements then distinguish a
+    /// fault that develops as e^(s t) from every motion of the states. For constant and ramp faults s = 0, or 1 in
+    /// sampled time. There must be at least as many measurements as N has columns. Singular values below 1e-12 of the
+    /// largest count as zero, rows and columns scaled to length one. [`detectability`] returns the hidden faults.
     ///
     /// # Errors
     ///

@@ -108,12 +108,11 @@ impl ExtendedPlant {
 
     /// Builds the continuous plant with the given faults.
     ///
-    /// `a`: n x n; `b`: n x m; `c`: p x n; `faults`: at least one for an observer, which is not checked
-    /// here; `filter`: the diagonal of W, p rates above zero in 1/s, or empty, which is possible if no
-    /// fault enters the measurements.
+    /// `a`: n x n; `b`: n x m; `c`: p x n; `faults`: at least one for an observer, which is not checked here; `filter`:
+    /// the diagonal of W, p rates above zero in 1/s, or empty, which is possible if no fault enters the measurements.
     /// `f_hat` holds the estimates in the order of the faults, then the rates of the ramps.
-    /// [`FaultyPlant::check_observer_exists`] and [`crate::detectability`] test whether an observer
-    /// exists: a sensor fault, for example, needs other measurements that show the same state.
+    /// [`FaultyPlant::check_observer_exists`] and [`crate::detectability`] test whether an observer exists: a sensor
+    /// fault, for example, needs other measurements that show the same state.
     ///
     /// # Example
     ///

@@ -51,9 +51,8 @@ impl FirstOrderHold {
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix,
-    /// [`Error::OutOfRange`] for a bad `h`, [`Error::Overflow`] when the result leaves the range of
-    /// double precision.
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix, [`Error::OutOfRange`] for a bad `h`,
+    /// [`Error::Overflow`] when the result leaves the range of double precision.
     pub fn new(a: &DMatrix<f64>, b: &DMatrix<f64>, h: f64) -> Result<Self, Error> {
         let [phi, gamma_0, gamma_1] = integrals(a, b, h, b.ncols())?;
         Ok(Self { phi, gamma_0, gamma_1 })

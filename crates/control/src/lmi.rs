@@ -1,5 +1,4 @@
-//! Linear matrix inequalities: pole regions, gain bounds, and the synthesis of feedback and
-//! observer gains.
+//! Linear matrix inequalities: pole regions, gain bounds, and the synthesis of feedback and observer gains.
 //!
 //! * [`Problem`] and [`Affine`]: semidefinite programs.
 //! * [`certify_region`]: proves that the eigenvalues of a matrix are in a [`Region`], with a

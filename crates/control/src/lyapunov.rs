@@ -69,14 +69,12 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<Solution, Error> {
 
 /// Solves A' P A - P = -Q.
 ///
-/// `a`: n x n, Schur stable (every eigenvalue inside of the unit circle); `q`: n x n, symmetric.
-/// The solution exists and is unique, and is symmetric positive definite when Q is: the sum of A'^k
-/// Q A^k over k from 0 on. Method: balancing of A, complex Schur form, substitution, refinement;
-/// about 100 n^3 multiplications; from 48 states on doubling first, as in [`lyapunov`]. Every entry of the
-/// residual is at most 1e-9 of the sum of its absolute terms.
+/// `a`: n x n, Schur stable (every eigenvalue inside of the unit circle); `q`: n x n, symmetric. The solution exists
+/// and is unique, and is symmetric positive definite when Q is: the sum of A'^k Q A^k over k from 0 on. Method:
+/// balancing of A, complex Schur form, substitution, refinement; about 100 n^3 multiplications; from 48 states on
+/// doubling first, as in [`lyapunov`]. Every entry of the residual is at most 1e-9 of the sum of its absolute terms.
 ///
-/// Source: G. Kitagawa, An algorithm for solving the matrix equation X = F X F' + S, Int. J.
-/// Control 25 (1977).
+/// Source: G. Kitagawa, An algorithm for solving the matrix equation X = F X F' + S, Int. J. Control 25 (1977).
 ///
 /// # Example
 ///

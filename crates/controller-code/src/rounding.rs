@@ -6,23 +6,21 @@
 //! kappa s,   s = the largest deviations of x_hat, f_hat, y and u from the operating point, and 1
 //! ```
 //!
-//! from the rounding of its constants, products and partial sums: r |a| |v| for a product a v, r times the
-//! magnitudes added so far for a sum, r = 2^-24 (N. J. Higham, Accuracy and Stability of Numerical
-//! Algorithms, 2002, equation (2.4) and section 3.1). The errors w of all vectors enter the loop of
-//! plant and controller,
+//! from the rounding of its constants, products and partial sums: r |a| |v| for a product a v, r times the magnitudes
+//! added so far for a sum, r = 2^-24 (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2002, equation
+//! (2.4) and section 3.1). The errors w of all vectors enter the loop of plant and controller,
 //!
 //! ```text
 //! d[k+1] = A d[k] + B w[k],   [du; df_hat] = C d[k] + D w[k],   d = [dx; dx_hat; df_hat]
 //! ```
 //!
 //! for the differences d, du, `df_hat` from exact arithmetic. With the peak-to-peak gains G of this system, G kappa s
-//! bounds the differences of the outputs u and f_hat.
-//! The bound holds in the loop of the design, while faults are compensated and no command is at a limit.
-//! s has the signals of single precision. If all their differences are at most M s and the spectral radius of M is
-//! below 1, they are bounded by the signals of double precision: rounding does not make the loop unstable.
-//! The residuals of a detection are further outputs, and x_r is part of d; their size follows from those of y
-//! and u. The bound takes the worst case of every rounding; errors of both signs cancel in practice. A scheduled loop
-//! is not such a system, and has no bound.
+//! bounds the differences of the outputs u and f_hat. The bound holds in the loop of the design, while faults are
+//! compensated and no command is at a limit. s has the signals of single precision. If all their differences are at
+//! most M s and the spectral radius of M is below 1, they are bounded by the signals of double precision: rounding does
+//! not make the loop unstable. The residuals of a detection are further outputs, and x_r is part of d; their size
+//! follows from those of y and u. The bound takes the worst case of every rounding; errors of both signs cancel in
+//! practice. A scheduled loop is not such a system, and has no bound.
 //!
 //! The law g(s) = rho s / (|s| + delta) of a sliding mode is not linear, but the slope of each of its chords is
 //! between 0 and c = rho / delta. So dg = (c / 2) ds + v with |v| <= (c / 2) |ds|, and v is one more input of the

@@ -54,8 +54,7 @@ pub(crate) struct Target<T> {
 }
 
 impl<T: Number> Target<T> {
-    /// C := alpha `product` + beta C; with beta = 0 C is not read. None, with C unchanged, if an argument
-    /// is illegal.
+    /// C := alpha `product` + beta C; with beta = 0 C is not read. None, with C unchanged, if an argument is illegal.
     ///
     /// # Safety
     ///

@@ -75,8 +75,7 @@ pub fn noncentral_survival(degrees: u32, noncentrality: f64, x: f64) -> f64 {
     sum.min(1.0)
 }
 
-/// The x that a chi-square variable with `degrees` degrees of freedom exceeds with the probability
-/// `probability`.
+/// The x that a chi-square variable with `degrees` degrees of freedom exceeds with the probability `probability`.
 ///
 /// `probability`: in 0 to 1, both excluded. Method: bisection of [`survival`] to the resolution of double
 /// precision. NaN for a probability outside of its range, and for no degrees of freedom.

@@ -18,8 +18,7 @@ const EXCEPTIONAL: usize = 10;
 /// subdiagonal entry counts as zero by the criterion of M. Ahues and F. Tisseur (LAPACK Working Note
 /// 122, 1997). Entries below the subdiagonal must be zero up to rounding: the bulge is added to them.
 ///
-/// Source: J. G. F. Francis, The QR transformation, part 2, Comput. J. 4 (1962); exceptional shifts:
-/// LAPACK's `dlahqr`.
+/// Source: J. G. F. Francis, The QR transformation, part 2, Comput. J. 4 (1962); exceptional shifts: LAPACK's `dlahqr`.
 pub(super) fn eigenvalues(mut h: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     let n = h.nrows();
     let smallest = f64::MIN_POSITIVE / f64::EPSILON;

@@ -56,9 +56,8 @@ impl DirectForm {
     ///
     /// # Errors
     ///
-    /// [`Error::FaultsNotDirect`] if the rank of C `F_a` is below q; [`Error::UnstableZeros`] if an
-    /// invariant zero of (A, `F_a`, C) is not stable in `domain`; same as [`FaultyPlant::check`] and
-    /// [`controllable_part`] otherwise.
+    /// [`Error::FaultsNotDirect`] if the rank of C `F_a` is below q; [`Error::UnstableZeros`] if an invariant zero of
+    /// (A, `F_a`, C) is not stable in `domain`; same as [`FaultyPlant::check`] and [`controllable_part`] otherwise.
     pub fn new(plant: &FaultyPlant, domain: Domain) -> Result<Self, Error> {
         plant.check()?;
         let FaultyPlant { a, c, f_a, .. } = plant;

@@ -6,8 +6,7 @@ use crate::gains::Gains;
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
-/// Adds a direct term to an augmented state observer: the proportional-integral observer with the same
-/// error dynamics.
+/// Adds a direct term to an augmented state observer: the proportional-integral observer with the same error dynamics.
 ///
 /// ```text
 /// f_hat = f_hat_i + P_f (y - C x_hat),  f_hat_i' = A_f f_hat_i + L_f (y - C x_hat),  P_f = part T L_f

@@ -119,12 +119,11 @@ pub struct Residual {
 /// Computes a residual generator of least order that responds to the faults with `pattern[fault]`
 /// and is decoupled from commands, disturbances and all other faults.
 ///
-/// `pattern`: one entry per fault, at least one true. Without noise and without faults of the pattern the
-/// residual decays with the prescribed poles for all commands, disturbances and decoupled faults, from all
-/// initial states of the reachable part of the plant. Method, cost and sources: see
-/// [`crate::isolation`]; about 100 n^3 multiplications for each order that is tried. The order is
-/// the least one of a generator with one residual for which every fault of the pattern has a gain at
-/// the required frequency and the required quality.
+/// `pattern`: one entry per fault, at least one true. Without noise and without faults of the pattern the residual
+/// decays with the prescribed poles for all commands, disturbances and decoupled faults, from all initial states of the
+/// reachable part of the plant. Method, cost and sources: see [`crate::isolation`]; about 100 n^3 multiplications for
+/// each order that is tried. The order is the least one of a generator with one residual for which every fault of the
+/// pattern has a gain at the required frequency and the required quality.
 ///
 /// # Example
 ///

@@ -12,9 +12,8 @@ use nalgebra::DMatrix;
 /// x' = A x + B_u u + B_d d + B_f f,   y = C x + D_u u + D_d d + D_f f
 /// ```
 ///
-/// with `x[k+1]` for x' in sampled time. There may be no disturbances: `B_d` n x 0, `D_d` p x 0. An
-/// actuator fault has the column of its command, a sensor fault a column of `D_f` that is a column
-/// of the identity matrix.
+/// with `x[k+1]` for x' in sampled time. There may be no disturbances: `B_d` n x 0, `D_d` p x 0. An actuator fault has
+/// the column of its command, a sensor fault a column of `D_f` that is a column of the identity matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DisturbedPlant {
     /// A, n x n.

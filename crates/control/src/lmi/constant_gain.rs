@@ -40,16 +40,14 @@ pub struct ConstantGain {
 /// the worst error from its lower bound at which the iteration ends, at least 1e-5. It also ends at a worst error
 /// of 1e-6 times the Frobenius norm of M, as of a target that a gain attains exactly.
 ///
-/// With `G_i` from [u; d; f] to [y; u] and M = [0, 0, I], Q [y; u] is a static residual generator
-/// for all systems of the family: its error is the response to commands and disturbances together
-/// with the error of the fault estimate. If sensor faults act through `D_i` only, fixed entries of Q
-/// make the response to them exact.
+/// With `G_i` from [u; d; f] to [y; u] and M = [0, 0, I], Q [y; u] is a static residual generator for all systems of
+/// the family: its error is the response to commands and disturbances together with the error of the fault estimate. If
+/// sensor faults act through `D_i` only, fixed entries of Q make the response to them exact.
 ///
-/// The problem is convex. Method: for a finite set of frequencies of each system the minimum is a
-/// semidefinite program, and a lower bound; the frequencies of the largest singular values of
-/// Q `G_i` - M join the set, until the largest exceeds the bound by less than `width` (an exchange
-/// method for semi-infinite programs: R. Hettich and K. O. Kortanek, SIAM Review 35 (1993)). Usually
-/// about 10 rounds.
+/// The problem is convex. Method: for a finite set of frequencies of each system the minimum is a semidefinite program,
+/// and a lower bound; the frequencies of the largest singular values of Q `G_i` - M join the set, until the largest
+/// exceeds the bound by less than `width` (an exchange method for semi-infinite programs: R. Hettich and K. O.
+/// Kortanek, SIAM Review 35 (1993)). Usually about 10 rounds.
 ///
 /// # Errors
 ///

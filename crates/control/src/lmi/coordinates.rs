@@ -28,11 +28,10 @@ pub(super) struct Coordinates {
 }
 
 impl Coordinates {
-    /// Coordinates in which the norm of A - c I is little more than its spectral radius. In balanced
-    /// coordinates T'T = P solves (A - c I)' P (A - c I) - `s^2` P = -`s^2` I. c is the mean of the
-    /// eigenvalues, s 1.2 times their largest distance from c, at least 0.1 |c|, or the norm of A if
-    /// all eigenvalues are zero. The unit is near |c| + s. None if rounding errors hide that P > 0;
-    /// [`Error::NotConverged`] when eigenvalues are not found.
+    /// Coordinates in which the norm of A - c I is little more than its spectral radius. In balanced coordinates T'T =
+    /// P solves (A - c I)' P (A - c I) - `s^2` P = -`s^2` I. c is the mean of the eigenvalues, s 1.2 times their
+    /// largest distance from c, at least 0.1 |c|, or the norm of A if all eigenvalues are zero. The unit is near |c| +
+    /// s. None if rounding errors hide that P > 0; [`Error::NotConverged`] when eigenvalues are not found.
     pub(super) fn of_dynamics(a: &DMatrix<f64>) -> Result<Option<Self>, Error> {
         let n = a.nrows();
         let Balance { matrix, scale } = Balance::new(a);

@@ -44,8 +44,7 @@ pub(super) fn smallest_eigenvalue(s: &DMatrix<f64>) -> Result<Option<f64>, Error
 /// A B in twice the precision: the unevaluated sum `high` + `low` of the rounded product and its
 /// rounding error, the latter rounded itself.
 ///
-/// Source: T. Ogita, S. M. Rump, S. Oishi, Accurate sum and dot product, SIAM J. Sci. Comput. 26
-/// (2005), algorithm 5.3.
+/// Source: T. Ogita, S. M. Rump, S. Oishi, Accurate sum and dot product, SIAM J. Sci. Comput. 26 (2005), algorithm 5.3.
 pub(crate) struct AccurateProduct {
     pub(crate) high: DMatrix<f64>,
     pub(crate) low: DMatrix<f64>,

@@ -68,10 +68,9 @@ impl GainNorm<'_> {
     /// Lowers the norm from a gain that is stable and in the region. Ends early with the best gain so far when
     /// [`limit::ending`] is true. Returns `start` if its norm cannot be computed.
     ///
-    /// Method: BFGS with a line search for the weak Wolfe conditions. It converges in practice also for functions
-    /// that are not smooth at their minimum: A. S. Lewis and M. L. Overton, Nonsmooth optimization
-    /// via quasi-Newton methods, Math. Program. 141 (2013). The entries are scaled by the norms of the rows and
-    /// columns of `start`.
+    /// Method: BFGS with a line search for the weak Wolfe conditions. It converges in practice also for functions that
+    /// are not smooth at their minimum: A. S. Lewis and M. L. Overton, Nonsmooth optimization via quasi-Newton methods,
+    /// Math. Program. 141 (2013). The entries are scaled by the norms of the rows and columns of `start`.
     pub(super) fn descend(&self, start: &DMatrix<f64>) -> DMatrix<f64> {
         let (rows, cols) = start.shape();
         let size = start.norm().max(f64::MIN_POSITIVE);

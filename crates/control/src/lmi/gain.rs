@@ -9,8 +9,7 @@ use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// Levels, relative to the smallest, that are tried in turn when the P of the smallest level cannot be
-/// verified.
+/// Levels, relative to the smallest, that are tried in turn when the P of the smallest level cannot be verified.
 const RELAXED_LEVELS: [f64; 4] = [1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
 
 /// For a level below `WEAK`, with B and C scaled to about one, the margin of the inequalities is not negligible: the
@@ -195,11 +194,10 @@ impl GainScaling {
 ///                    [P, P B, 0; *, gamma^2 I, D'; *, *, I] > 0
 /// ```
 ///
-/// The initial state is zero. The norm is finite if and only if the controllable and observable
-/// part of the system is stable; here all of A must be stable, otherwise the outcome is
-/// [`Outcome::Infeasible`] with the conflict "stability". The bound exceeds the norm by 1e-6 to
-/// 1e-3 of it. It is proven: the inequalities are verified for P and gamma in the units of the
-/// data, with products in twice the precision.
+/// The initial state is zero. The norm is finite if and only if the controllable and observable part of the system is
+/// stable; here all of A must be stable, otherwise the outcome is [`Outcome::Infeasible`] with the conflict
+/// "stability". The bound exceeds the norm by 1e-6 to 1e-3 of it. It is proven: the inequalities are verified for P and
+/// gamma in the units of the data, with products in twice the precision.
 ///
 /// Source: S. Boyd, L. El Ghaoui, E. Feron, V. Balakrishnan, Linear matrix inequalities in system
 /// and control theory (1994), (2.25); M. A. Rotea, The generalized H2 control problem, Automatica

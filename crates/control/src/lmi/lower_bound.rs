@@ -22,26 +22,23 @@ use nalgebra::{DMatrix, SymmetricEigen};
 /// (sampled: gamma_low^2 = tr(E H_+ E') / tr(H_ww),  H_+ = [A, B] H [A, B]',  H_+ - H_xx >= 0)
 /// ```
 ///
-/// Such an H is the covariance of growing disturbances that the measurement does not show, for which every
-/// filter estimates z = 0. So no filter from y to an estimate of z, of any order, has an error with a smaller norm.
-/// For error dynamics A - L C the traces of H with the inequality of the norm (see [`super::certify_gain`]) give the
-/// bound for every L. In sampled time `z[k]` is estimated from `y[0]` to `y[k-1]`, as by A - L C.
-/// The largest bound is computed; it equals the least norm of any filter (strong duality). Constant gains in general
-/// only approach this norm.
+/// Such an H is the covariance of growing disturbances that the measurement does not show, for which every filter
+/// estimates z = 0. So no filter from y to an estimate of z, of any order, has an error with a smaller norm. For error
+/// dynamics A - L C the traces of H with the inequality of the norm (see [`super::certify_gain`]) give the bound for
+/// every L. In sampled time `z[k]` is estimated from `y[0]` to `y[k-1]`, as by A - L C. The largest bound is computed;
+/// it equals the least norm of any filter (strong duality). Constant gains in general only approach this norm.
 ///
-/// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm and
-/// bound are not used. None if D does not have full row rank (a measurement without noise), if there is no Kalman
-/// filter, if no hidden disturbance reaches a state or E = 0, or if the inequalities could not be verified in
-/// double precision.
+/// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm and bound are
+/// not used. None if D does not have full row rank (a measurement without noise), if there is no Kalman filter, if no
+/// hidden disturbance reaches a state or E = 0, or if the inequalities could not be verified in double precision.
 ///
 /// Method: w = -D' (D D')^-1 C x + N d, N a basis of the null space of D, meets [C, D] H = 0. The
 /// semidefinite program for the covariance of (x, d) is solved for the part of the states that d
 /// reaches, in coordinates in which the covariance of the Kalman filter is the identity. The result is verified by
 /// eigenvalues in the coordinates of that part.
 ///
-/// Source: dual of the inequality of the H-infinity filter; V. Balakrishnan and L. Vandenberghe,
-/// Semidefinite programming duality and linear time-invariant systems, IEEE Trans. Autom. Control 48
-/// (2003), section IV.
+/// Source: dual of the inequality of the H-infinity filter; V. Balakrishnan and L. Vandenberghe, Semidefinite
+/// programming duality and linear time-invariant systems, IEEE Trans. Autom. Control 48 (2003), section IV.
 ///
 /// # Example
 ///

@@ -115,8 +115,7 @@ struct ObserverProgram<'a> {
     coordinates: Coordinates,
     /// The coordinates of plant states and weight states together; None without weights.
     extended: Option<Coordinates>,
-    /// Units of the measurements: powers of two near the lengths of the rows of C in the
-    /// coordinates.
+    /// Units of the measurements: powers of two near the lengths of the rows of C in the coordinates.
     units: DVector<f64>,
 }
 

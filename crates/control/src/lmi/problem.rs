@@ -9,8 +9,7 @@ use crate::Error;
 use crate::balance::power_of_two;
 use nalgebra::{DMatrix, DVector};
 
-/// A requirement violated by less than this, relative to its largest entry, counts as neither met
-/// nor in conflict.
+/// A requirement violated by less than this, relative to its largest entry, counts as neither met nor in conflict.
 const UNDECIDED: f64 = 1e-7;
 
 /// A semidefinite program: unknown matrices, requirements on them, and an objective.
@@ -19,13 +18,12 @@ const UNDECIDED: f64 = 1e-7;
 /// minimise c(x) such that S_i(x) - m_i I is positive semidefinite for every i
 /// ```
 ///
-/// Method: the interior point method of Clarabel (Goulart and Chen, 2024) on data in which the
-/// largest entry of each requirement is about one. The result is accepted only if the eigenvalues
-/// of every `S_i`(x) show that at least half of the margin `m_i` is kept. Otherwise the largest t
-/// such that every `S_i`(x) - `m_i` I - t I is positive semidefinite is computed, which always
-/// exists. If t < 0 the requirements contradict each other. Requirements without which the others
-/// still contradict each other are then removed, in the order in which they were stated; each of
-/// the remaining ones is necessary for the contradiction.
+/// Method: the interior point method of Clarabel (Goulart and Chen, 2024) on data in which the largest entry of each
+/// requirement is about one. The result is accepted only if the eigenvalues of every `S_i`(x) show that at least half
+/// of the margin `m_i` is kept. Otherwise the largest t such that every `S_i`(x) - `m_i` I - t I is positive
+/// semidefinite is computed, which always exists. If t < 0 the requirements contradict each other. Requirements without
+/// which the others still contradict each other are then removed, in the order in which they were stated; each of the
+/// remaining ones is necessary for the contradiction.
 ///
 /// Cost: some 20 iterations of about u^3 + u^2 k^2 multiplications, u unknowns, k the order of the
 /// largest requirement; a conflict costs that once more for each named requirement.

@@ -24,8 +24,7 @@ pub struct Disc {
     pub radius: f64,
 }
 
-/// A region of the complex plane: the intersection of the parts that are given; without any, the
-/// region of stability.
+/// A region of the complex plane: the intersection of the parts that are given; without any, the region of stability.
 ///
 /// Continuous time: eigenvalues s. Sampled time: eigenvalues z of the sampled system.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -185,13 +184,12 @@ impl Shape {
 ///                           cos(t) (A' P - P A), sin(t) (P A + A' P)] < 0
 /// ```
 ///
-/// `a`: n x n. P exists if and only if the eigenvalues are in the region. Of all P <= I the one
-/// farthest inside of all inequalities is computed, in the coordinates in which A is a multiple of
-/// the identity plus a matrix whose norm is about the spread of the eigenvalues. An eigenvalue
-/// outside of the region gives [`Outcome::Infeasible`] with the names of the parts that it
-/// violates; an eigenvalue inside by less than 1e-7 of the size of the spectrum may give
-/// [`Outcome::Inconclusive`]. The inequalities are verified in the units of the data, with products
-/// in twice the precision.
+/// `a`: n x n. P exists if and only if the eigenvalues are in the region. Of all P <= I the one farthest inside of all
+/// inequalities is computed, in the coordinates in which A is a multiple of the identity plus a matrix whose norm is
+/// about the spread of the eigenvalues. An eigenvalue outside of the region gives [`Outcome::Infeasible`] with the
+/// names of the parts that it violates; an eigenvalue inside by less than 1e-7 of the size of the spectrum may give
+/// [`Outcome::Inconclusive`]. The inequalities are verified in the units of the data, with products in twice the
+/// precision.
 ///
 /// Source: M. Chilali and P. Gahinet, H-infinity design with pole placement constraints: an LMI
 /// approach, IEEE Trans. Autom. Control 41 (1996), theorem 2.2 and section II.C.

@@ -47,10 +47,9 @@ pub struct ScheduleCertificate {
 
 /// The Bernstein coefficients of a polynomial of degree d from its values at t = 0, 1/d, ..., 1.
 ///
-/// `values`: d + 1 matrices of one shape. The values of the polynomial between 0 and 1 are in the
-/// convex hull of the coefficients; the first and the last coefficient are the values at the ends.
-/// Method: the linear equations with the values of the Bernstein polynomials; for d up to 6 the
-/// error is below 1e3 units of rounding of the largest value.
+/// `values`: d + 1 matrices of one shape. The values of the polynomial between 0 and 1 are in the convex hull of the
+/// coefficients; the first and the last coefficient are the values at the ends. Method: the linear equations with the
+/// values of the Bernstein polynomials; for d up to 6 the error is below 1e3 units of rounding of the largest value.
 ///
 /// # Errors
 ///
@@ -116,11 +115,10 @@ pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
 /// sampled time then rounded. Cost: that of a program with n (n + 1) / 2 unknowns for each grid point and,
 /// for each interval, 4 (d + 2) inequalities of order 2 n, in continuous time 2 (d + 2) of order n.
 ///
-/// Source: P. Apkarian, P. Gahinet, G. Becker, Self-scheduled H-infinity control of linear
-/// parameter-varying systems, Automatica 31 (1995); F. Wu, X. H. Yang, A. Packard, G. Becker,
-/// Induced L2-norm control for LPV systems with bounded parameter variation rates, Int. J. Robust
-/// Nonlinear Control 6 (1996); in sampled time the inequality of J. Daafouz and J. Bernussou,
-/// Parameter dependent Lyapunov functions for discrete time systems, Systems & Control Letters 43
+/// Source: P. Apkarian, P. Gahinet, G. Becker, Self-scheduled H-infinity control of linear parameter-varying systems,
+/// Automatica 31 (1995); F. Wu, X. H. Yang, A. Packard, G. Becker, Induced L2-norm control for LPV systems with bounded
+/// parameter variation rates, Int. J. Robust Nonlinear Control 6 (1996); in sampled time the inequality of J. Daafouz
+/// and J. Bernussou, Parameter dependent Lyapunov functions for discrete time systems, Systems & Control Letters 43
 /// (2001).
 ///
 /// # Errors

@@ -22,9 +22,8 @@ pub(super) enum End {
     Stalled,
 }
 
-/// Minimises `objective`' x subject to every matrix being positive semidefinite. None if the
-/// problem is infeasible or unbounded, the solver failed, or the condition of [`limit::ending`] is true. The result is
-/// not verified.
+/// Minimises `objective`' x subject to every matrix being positive semidefinite. None if the problem is infeasible or
+/// unbounded, the solver failed, or the condition of [`limit::ending`] is true. The result is not verified.
 ///
 /// The solver receives the upper triangle of each matrix column by column, off-diagonal entries times sqrt(2).
 pub(super) fn minimise(

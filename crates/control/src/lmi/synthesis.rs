@@ -23,22 +23,20 @@ const NOT_PROVEN: &str = "a gain was found, but the requirements could not be pr
 /// For an observer augmented by the fault, with (`A_0`, `C_0`): B = [0; -I] from the fault rate to the errors [e;
 /// eps] of state and fault, or B = `-F_0` from the fault to [e; `f_hat`], `f_hat` its estimate.
 ///
-/// Region only: L exists if (A, C) is observable and the parts of the region have a real interval in common.
-/// P >= I, and Z of a norm up to twice the smallest possible, are chosen as far inside of all inequalities as
-/// possible. With a performance, one P for all inequalities is sufficient, not necessary. For a given bound
-/// the gain is as far inside of the inequalities as possible. Without one, the smallest bound is computed,
-/// and the gain is designed for a bound 5 % larger, as far inside as possible, because gains often grow
-/// without limit towards the smallest bound. If w does not act on the measurement, faster eigenvalues always lower
-/// the norm: give a disc to limit the gain.
+/// Region only: L exists if (A, C) is observable and the parts of the region have a real interval in common. P >= I,
+/// and Z of a norm up to twice the smallest possible, are chosen as far inside of all inequalities as possible. With a
+/// performance, one P for all inequalities is sufficient, not necessary. For a given bound the gain is as far inside of
+/// the inequalities as possible. Without one, the smallest bound is computed, and the gain is designed for a bound 5 %
+/// larger, as far inside as possible, because gains often grow without limit towards the smallest bound. If w does not
+/// act on the measurement, faster eigenvalues always lower the norm: give a disc to limit the gain.
 ///
 /// The program is solved in coordinates in which all states are equally observable at the speed
 /// that the region requires; if no gain is found, up to three times more in coordinates in which
 /// the most interior P becomes the identity. With a performance, P and Z are bounded by 1e6 in these
 /// coordinates; a conflict that names "gain" means that no gain exists within these bounds.
 ///
-/// Then [`certify_region`] and [`certify_gain`] prove region and bound for A - L C itself, each with a
-/// P of its own. Conflicts name the requirements "decay", "disc", "sector" ("stability" when no
-/// region is given) and "gain".
+/// Then [`certify_region`] and [`certify_gain`] prove region and bound for A - L C itself, each with a P of its own.
+/// Conflicts name the requirements "decay", "disc", "sector" ("stability" when no region is given) and "gain".
 ///
 /// Source: M. Chilali and P. Gahinet (1996, see [`certify_region`]), section IV, for the dual problem of state
 /// feedback; M. Chilali, P. Gahinet, P. Apkarian, Robust pole placement in LMI regions, IEEE Trans. Autom. Control 44

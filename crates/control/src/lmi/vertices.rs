@@ -41,11 +41,10 @@ pub struct CommonFeedback {
 /// P > 0 and, for each i, the inequalities of certify_region with A = A_i
 /// ```
 ///
-/// `vertices`: n x n, at least one. The inequalities are affine in A, so P proves the same for
-/// every matrix in the convex hull of the vertices. With P the function V = x' P x decreases along
-/// x' = A(t) x, or x+ = `A_k` x, while A varies in the hull with time in any way, arbitrarily fast:
-/// V(t) <= exp(-2 alpha t) V(0) for a decay rate alpha. For the disc and the sector P is a
-/// proof for each constant matrix of the hull only. One P is sufficient, not necessary.
+/// `vertices`: n x n, at least one. The inequalities are affine in A, so P proves the same for every matrix in the
+/// convex hull of the vertices. With P the function V = x' P x decreases along x' = A(t) x, or x+ = `A_k` x, while A
+/// varies in the hull with time in any way, arbitrarily fast: V(t) <= exp(-2 alpha t) V(0) for a decay rate alpha. For
+/// the disc and the sector P is a proof for each constant matrix of the hull only. One P is sufficient, not necessary.
 ///
 /// Of all P <= I the one farthest inside of all inequalities is computed, in coordinates that suit the first vertex,
 /// then up to three times in coordinates in which the most interior P is the identity. P is verified for each vertex in

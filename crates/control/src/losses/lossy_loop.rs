@@ -28,8 +28,7 @@ const DIRECTIONS: usize = 70;
 /// A(E) = A(0) - sum over j of E_j D_j,  0 <= E_j <= largest_j
 /// ```
 ///
-/// z are the states of the controller. A(E) is affine in E, so that a box of losses is the convex hull of
-/// its corners.
+/// z are the states of the controller. A(E) is affine in E, so that a box of losses is the convex hull of its corners.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossyLoop {
@@ -60,8 +59,7 @@ impl LossyLoop {
     ///
     /// # Errors
     ///
-    /// Same as [`closed_loop`]; [`Error::OutOfRange`] for an input that does not exist or a bad number of
-    /// inputs.
+    /// Same as [`closed_loop`]; [`Error::OutOfRange`] for an input that does not exist or a bad number of inputs.
     pub fn new(
         plant: &FaultyPlant,
         controller: &StateSpace,

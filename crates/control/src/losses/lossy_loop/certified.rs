@@ -24,10 +24,9 @@ impl LossyLoop {
     /// Computes the largest factor t for which one Lyapunov matrix proves that the loop is stable for
     /// all losses in the box from 0 to t times `largest`, also for losses that vary with time.
     ///
-    /// `largest`: as in [`LossyLoop::constant_limit`]; `most`: the largest t that is tried, in
-    /// practice the factor of `constant_limit`. `most` itself is tried first. Method: bisection,
-    /// relative accuracy 1 %; every certificate is verified by eigenvalues
-    /// ([`certify_common`]). The loop may be stable for a larger factor without such a proof.
+    /// `largest`: as in [`LossyLoop::constant_limit`]; `most`: the largest t that is tried, in practice the factor of
+    /// `constant_limit`. `most` itself is tried first. Method: bisection, relative accuracy 1 %; every certificate is
+    /// verified by eigenvalues ([`certify_common`]). The loop may be stable for a larger factor without such a proof.
     ///
     /// # Errors
     ///
