@@ -52,8 +52,7 @@ pub(super) struct Controller {
     pub(super) states: Vec<Signal>,
     pub(super) actuators: Vec<Signal>,
     pub(super) measurements: Vec<Signal>,
-    /// For each measurement, the largest number of samples for which its last value may replace it; `None` without a
-    /// limit.
+    /// For each measurement, the most samples for which its last value may replace it; `None` without a limit.
     pub(super) most_held: Vec<Option<u32>>,
     pub(super) faults: Vec<Signal>,
     pub(super) references: Vec<Signal>,

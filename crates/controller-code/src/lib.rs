@@ -94,8 +94,7 @@ pub struct Request<'a> {
     pub identity: &'a str,
     /// The verdict on the design: one word.
     pub verdict: &'static str,
-    /// The common delay of all commands, in s, at which the loop becomes unstable; infinite if no delay destabilises
-    /// the loop, `None` if the delay is not known.
+    /// The common delay of all commands in s that makes the loop unstable; infinite without one, `None` if unknown.
     pub delay_margin: Option<f64>,
     /// The programming language of the code.
     pub language: Language,

@@ -118,8 +118,7 @@ impl Reconfiguration {
         }
     }
 
-    /// The number of sets of gains without the fall-back: the set of the intact plant, then the sets without certain
-    /// actuators.
+    /// The number of sets of gains without the fall-back: of the intact plant, then without certain actuators.
     pub(super) fn regular_sets(&self) -> usize {
         self.sets.len() - usize::from(self.fallback.is_some())
     }
@@ -157,8 +156,7 @@ impl Reconfiguration {
         matrices.flat_map(|matrix| matrix.iter().copied()).chain(of_cases.flatten())
     }
 
-    /// The tables of real numbers: the gains from stuck actuators, the commands at which these are stuck, and the
-    /// fractions of losses.
+    /// The tables of real numbers: gains from stuck actuators, commands of stuck actuators, fractions of losses.
     pub(super) fn tables(&self, actuators: &[Signal]) -> Vec<Constants> {
         let k_s = self.sets.iter().map(|set| &set.k_s);
         let meaning = "gains from the commands of stuck actuators";

@@ -6,8 +6,7 @@ use super::controller::Controller;
 use super::symbols::{Kind, Matrix};
 
 impl Matrix {
-    /// The matrix of a controller; `None` if the controller does not have it. `A_f` is the identity if faults are
-    /// constant.
+    /// The matrix of a controller, `None` without it; the identity for `A_f` of constant faults.
     pub(super) fn of(self, controller: &Controller) -> Option<&DMatrix<f64>> {
         let detection = controller.detection.as_ref();
         match self {

@@ -71,8 +71,7 @@ impl Schedule {
         slope
     }
 
-    /// Writes the combination `mix` of both ends of the interval into each scheduled matrix and into the operating
-    /// point.
+    /// Writes the combination `mix` of both ends of the interval into each scheduled matrix and the operating point.
     fn write(&self, interval: usize, mix: impl Fn([f64; 2]) -> f64, design: &mut Design) {
         let [from, to] = [0, 1].map(|end| &self.points[interval + end]);
         let places = design.scheduled_mut();

@@ -62,8 +62,7 @@ struct Names {
 
 #[expect(clippy::missing_errors_doc, reason = "the type says them")]
 impl PlantEquations {
-    /// Creates the equations of `fmu` with the parameters of `request`. Ignores the states that `request` names: x has
-    /// all states.
+    /// Creates the equations of `fmu` with the parameters of `request`. x has all states, also if `request` names some.
     ///
     /// # Errors
     ///

@@ -19,8 +19,7 @@ pub struct Schedule {
     pub points: Vec<Point>,
 }
 
-/// The matrices and the operating point at a value of the scheduling variable, in place of the constant ones of the
-/// design.
+/// The matrices and the operating point at one value of the scheduling variable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Point {

@@ -76,8 +76,7 @@ impl Slave for Integrated {
         self.instance.setup_experiment(experiment)
     }
 
-    /// Exits initialization mode. Also iterates the first event and enters continuous-time mode, unless the master
-    /// handles the events.
+    /// Also enters continuous-time mode after the first event, unless the master handles the events.
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
         self.instance.exit_initialization_mode()?;
         self.point.mode = Mode::Event;

@@ -57,8 +57,7 @@ impl Integrated {
             .map_err(|error| failed(format!("cannot serialise its state: {error}")))
     }
 
-    /// Restores the states of integration and FMU from bytes of [`Integrated::serialize`]; on failure the integration
-    /// keeps its state.
+    /// Restores integration and FMU from bytes of [`Integrated::serialize`]; on failure the integration is unchanged.
     pub(super) fn deserialize(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let read: Result<(Saved, Vec<u8>), _> = postcard::from_bytes(bytes);
         let (saved, fmu_state) =
