@@ -101,7 +101,7 @@ impl Mode {
         Some(if self.is_at(0, j) { low } else { high })
     }
 
-    /// [`Mode::held_command`] as a deviation from the operating point.
+    /// The command of [`Mode::held_command`] as a deviation from the operating point.
     pub(crate) fn held_deviation(self, design: &Design, j: usize) -> Option<f64> {
         Some(self.held_command(design, j)? - design.actuators[j].operating.unwrap_or(0.0))
     }

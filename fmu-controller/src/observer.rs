@@ -1,8 +1,7 @@
 //! The observer with its feedback as one piecewise linear system, stepped exactly.
 //!
-//! While no channel reaches or leaves a limit, the equations are `z' = M z + N [y; r; w]`, w being the
-//! commands of the channels at a limit, so one step is exact for `y = y_0 + y_1 t` and r likewise: the
-//! hold of [`FirstOrderHold`].
+//! While no channel reaches or leaves a limit, the equations are `z' = M z + N [y; r; w]` with the commands w of the
+//! channels at a limit, so one step is exact for `y = y_0 + y_1 t` and r likewise: the hold of [`FirstOrderHold`].
 
 use std::sync::Arc;
 

@@ -103,7 +103,7 @@ impl Signals {
         self.set_inputs(values, point, offset);
     }
 
-    /// Subtracts D u from the measurements, u being the commands of the sample before. Does nothing without D.
+    /// Subtracts D u from the measurements, with the commands u of the sample before. Does nothing without D.
     pub(crate) fn remove_feedthrough(&mut self, design: &Design) {
         let Some(d) = &design.d else { return };
         for (k, y) in self.y.iter_mut().enumerate() {

@@ -4,7 +4,7 @@ use crate::eigen::eigenvalues;
 use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
-/// Relative error of an eigenvalue near the stability limit that rounding causes.
+/// Relative rounding error of an eigenvalue near the stability limit.
 const ROUNDING: f64 = 1e-12;
 
 /// Distance of a matrix beyond the stability limit; negative when the matrix is stable.

@@ -17,7 +17,7 @@ pub(super) struct TestState {
     sums: Vec<f64>,
     /// The times in s since which S+ and S- are above 0, or the start of the window.
     since: Vec<f64>,
-    /// Samples in the window.
+    /// The number of samples in the window so far.
     count: u32,
     /// max(S+, S-), or s of the last whole window.
     pub(super) statistic: f64,

@@ -47,7 +47,7 @@ pub(super) fn table(plant: &FaultyPlant, domain: Domain) -> Result<Vec<Vec<Visib
 
 /// The states that a fault reaches.
 struct Reach {
-    /// The states of the augmented plant that the fault moves while it develops by its model.
+    /// The states of plant and fault model that the fault moves while it develops by its model.
     by_model: Staircase,
     /// The states of the plant that `column` reaches.
     controllable: Staircase,

@@ -94,7 +94,7 @@ impl Requirements {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Residual {
-    /// The generator, with one residual. Its order is the least one for this pattern.
+    /// The generator of one residual, of the least order for this pattern.
     pub generator: ResidualGenerator,
     /// The system from the faults f to the residual, with the poles of the generator. The columns of
     /// decoupled faults are zero up to rounding.

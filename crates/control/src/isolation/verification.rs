@@ -8,7 +8,7 @@ use crate::response::Transfer;
 use crate::{Domain, StateSpace};
 use nalgebra::Complex;
 
-/// Frequencies at which the decoupling is verified, relative to the fastest pole, or to pi / period.
+/// Frequencies at which the decoupling is verified, relative to the fastest pole, in sampled time to pi / period.
 const CONTINUOUS: [f64; 5] = [0.03, 0.3, 1.0, 3.0, 30.0];
 const SAMPLED: [f64; 5] = [0.01, 0.1, 0.3, 0.6, 0.9];
 

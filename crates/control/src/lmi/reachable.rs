@@ -168,7 +168,8 @@ struct Reachability {
 }
 
 impl Reachability {
-    /// The smallest Q for one matrix, where the inequality is an equation; None if the rate is too large for that.
+    /// The smallest Q for one matrix, where the inequality is an equation; None if the rate is too large for a
+    /// solution.
     fn smallest(&self, a: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
         let (n, part) = (a.nrows(), self.part());
         let (equation, shifted) = match self.domain {

@@ -77,7 +77,7 @@ struct Lifted<'a> {
 /// The effects of an input over one sample interval: on x at the end of the interval and at the start of each part, and
 /// on eps.
 struct Effects {
-    /// For each part of the input: its effect on x[k+1], n + filters rows.
+    /// For each part of the input, the effect on x[k+1], n + filters rows.
     states_after: Vec<DMatrix<f64>>,
     /// Whether the observer knows the effect on x[k+1]; then the error e[k+1] does not contain it.
     is_known: bool,
@@ -155,7 +155,7 @@ impl<'a> Lifted<'a> {
         }
     }
 
-    /// The effects of f[k] of a fault without jumps: `F_a` + B `K_f` of the sampled plant.
+    /// The effects of the part of a fault without jumps that is not compensated: `F_a` + B `K_f` of the sampled plant.
     fn uncancelled(&self) -> Effects {
         let Gains { k_f, .. } = self.gains;
         let until = |i: usize| (0..i).fold(&self.gamma[i] * k_f, |sum, j| sum + self.effect(i, j));

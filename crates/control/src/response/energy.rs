@@ -14,8 +14,8 @@ pub struct Energy {
     /// The H2 norm: the root of the trace of the covariance, see [`energy`]. The root-mean-square value of z under
     /// white noise of unit intensity; also the root of the energy of z summed over an impulse at each input.
     pub h2: f64,
-    /// The generalised H2 norm: the root of the largest eigenvalue of the covariance. The largest Euclidean length of z
-    /// that an input of unit energy can cause.
+    /// The generalised H2 norm: the largest Euclidean length of z that an input of unit energy can cause. It is the
+    /// root of the largest eigenvalue of the covariance.
     pub peak: f64,
     /// The roots of the diagonal of the covariance: the largest |`z_i`| that an input of unit energy can cause, p.
     pub peaks: Vec<f64>,

@@ -132,7 +132,7 @@ impl Transfer {
         Self { transposed: h.transpose(), b, c, d, domain }
     }
 
-    /// The transfer function from one input to the output of the same number.
+    /// The transfer function from input `channel` to output `channel`.
     pub(super) fn channel(&self, channel: usize) -> Self {
         Self {
             transposed: self.transposed.clone(),

@@ -76,7 +76,7 @@ impl Length {
         states.column_iter().zip(products.column_iter()).map(one).collect()
     }
 
-    /// A bound of the integral of |h| from `state` on; infinite if the Frobenius norm of `phi` is above 1/2.
+    /// A bound of the integral of |h| after `state`; infinite if the Frobenius norm of `phi` is above 1/2.
     pub(super) fn tail(&self, state: &DVector<f64>) -> f64 {
         let contraction = self.phi.norm();
         if contraction > 0.5 {

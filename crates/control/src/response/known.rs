@@ -95,7 +95,7 @@ impl KnownResponse {
         self
     }
 
-    /// The system from one input to the output of the same number.
+    /// The system from input `channel` to output `channel`.
     pub(crate) fn channel(&self, channel: usize) -> Self {
         let entry = |(at, gain): (&u64, &DMatrix<Complex<f64>>)| {
             (*at, gain.view((channel, channel), (1, 1)).into())

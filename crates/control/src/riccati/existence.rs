@@ -8,7 +8,7 @@ use crate::svd::ComplexSvd;
 use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
 
-/// Relative size of a singular value that counts as zero, per state.
+/// A relative singular value below this times the number of states counts as zero.
 const TOLERANCE_PER_STATE: f64 = 1e-13;
 /// Eigenvalues closer than this to the stability limit, relative to the norm of A, do not count as stable.
 const NEAR: f64 = 1e-12;

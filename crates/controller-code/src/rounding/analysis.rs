@@ -106,8 +106,8 @@ impl<'a> Analysis<'a> {
         2 * n + q + t + k
     }
 
-    /// The numbers of columns: of forms, with room for the errors of 6 vectors of each kind and for v; of magnitudes,
-    /// for the signals and 1.
+    /// The numbers of columns: of linear forms, with room for the errors of 6 vectors of each kind and for v; of
+    /// magnitudes, for the signals and 1.
     fn widths(&self) -> Widths {
         let signals: usize = Kind::ALL.map(|kind| self.count(kind)).iter().sum();
         let detection = self.count(Kind::ResidualState) + self.count(Kind::Residual);
