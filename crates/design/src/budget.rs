@@ -9,10 +9,10 @@ use control::lmi::{Ending, until};
 /// The time that a design may take, and how to end it.
 #[derive(Debug, Clone)]
 pub struct TimeLimits {
-    /// Time for the search for gains. A design whose gains are not found by then is refused.
+    /// Time for the search for gains. A design whose gains are not found in this time is refused.
     pub gains: Duration,
-    /// Time for certificates and bounds together. Those that are not computed by then are left out, and the report says
-    /// so. Zero leaves all of them out.
+    /// Time for certificates and bounds together. Certificates and bounds that are not computed in this time are left
+    /// out, and the report says so. Zero leaves all of them out.
     pub certificates: Duration,
     /// True ends the search for gains, certificates and bounds; the report has what was done by then.
     pub interrupted: Arc<AtomicBool>,
@@ -42,7 +42,7 @@ impl TimeLimits {
     }
 }
 
-/// Time that a phase of one design may take before the rest of it is left out.
+/// Time that a phase of one design may take before the rest of this phase is left out.
 #[derive(Clone)]
 pub(crate) struct Budget {
     start: Instant,
@@ -73,7 +73,7 @@ impl Budget {
         self.start.elapsed() >= self.limit || self.interrupted.load(Ordering::Relaxed)
     }
 
-    /// Runs `compute`; linear matrix inequalities in it end when the time is over.
+    /// Runs `compute`; its linear matrix inequalities are abandoned when the time is over.
     pub(crate) fn run<T>(&self, compute: impl FnOnce() -> T) -> T {
         let budget = self.clone();
         let ending: Ending = Arc::new(move || budget.is_over());

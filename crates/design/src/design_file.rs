@@ -111,7 +111,7 @@ impl Designed {
     }
 }
 
-/// Converts a signal to that of the design file.
+/// Converts a signal of the plant file to a signal of the design file.
 pub(crate) fn as_stated(signal: &PlantSignal) -> Signal {
     Signal {
         name: signal.name.clone(),

@@ -11,7 +11,7 @@ use fmu_import::described_as;
 
 use crate::Error;
 
-/// The files that turn a packed FMU into that of a design.
+/// The files that turn a packed FMU into the FMU of a design.
 pub(crate) struct Content<'a> {
     /// The name of the model in the packed FMU.
     pub(crate) model: &'static str,

@@ -35,7 +35,7 @@ pub enum Error {
         /// The error of the operating system.
         source: io::Error,
     },
-    /// An error with its context.
+    /// An error with its context: the file, or the plant of a family or schedule.
     #[error("{what}")]
     Within {
         /// The context.

@@ -23,7 +23,7 @@ const FILTERS: [f64; 4] = [10.0, 100.0, 1000.0, 1.0];
 
 /// A new plant file.
 pub struct NewPlantFile {
-    /// Its content.
+    /// Content of the plant file.
     pub text: String,
     /// Why no controller was found for the plant, if there is none.
     pub refusal: Option<String>,

@@ -29,8 +29,8 @@ const MOST_STEPS: f64 = 1e4;
 ///
 /// # Errors
 ///
-/// The file asks for something that this filter does not have, or its FMU cannot be part of one; the message has the
-/// line, and what helps.
+/// The file asks for something that this filter does not have, or the plant's FMU cannot be part of a filter; the
+/// message has the line, and what helps.
 pub(crate) fn kalman_design(
     file: &PlantFile<'_>,
     designed: &Designed,
@@ -124,8 +124,8 @@ pub(crate) fn kalman_design(
     })
 }
 
-/// Returns the factor of the covariances with which the variances of the measurements agree with those of the file, in
-/// the geometric mean; None if the file does not state them, or one is 0.
+/// Returns the factor of the covariances with which the variances of the measurements agree with the variances in the
+/// file, in the geometric mean; None if the file states no variances, or one is 0.
 fn scale(file: &PlantFile<'_>, noise: &Noise) -> Option<f64> {
     if !noise.is_relative {
         return Some(1.0);

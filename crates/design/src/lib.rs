@@ -70,7 +70,7 @@ pub struct Design {
     /// plant file of matrices cannot state how a fault or a disturbance enters the plant's FMU.
     pub worst_case: Option<String>,
     /// The loop of plant and controller while commands are within their limits, in deviations from the operating point;
-    /// sampled if the controller is. In a design for several plants it is the loop of the plant of the file.
+    /// sampled if the controller is sampled. In a design for several plants: the loop of the plant of the file.
     pub closed_loop: Loop,
     /// The FMU of the plant, if the plant file names one.
     pub model: Option<PathBuf>,

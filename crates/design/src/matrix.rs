@@ -1,4 +1,4 @@
-//! Matrices as lists of rows, as the report and the design file have them.
+//! Matrices as lists of rows, the form in the report and the design file.
 
 use aso_controller::Matrix;
 use nalgebra::{Complex, DMatrix};

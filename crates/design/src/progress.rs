@@ -15,7 +15,7 @@ pub struct Progress {
 /// A function that is called when a step begins, possibly by several threads at the same time.
 pub type Observer<'a> = dyn Fn(Progress) + Sync + 'a;
 
-/// The steps that take the time of a design. Some of them run at the same time.
+/// The steps of a design that take most of the time. Some of them run at the same time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Step {
     Gains,

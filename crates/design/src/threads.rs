@@ -7,7 +7,7 @@ use rayon::ThreadPoolBuilder;
 
 use crate::Error;
 
-/// Starts the threads, unless they run. Rayon would start them at their first use, and panic if the system refuses one.
+/// Starts the threads of Rayon, which would start at the first use, but then panic if the system refuses a thread.
 ///
 /// # Errors
 ///

@@ -25,7 +25,7 @@ const OUTPUTS_AT_ONCE: usize = 64;
 pub(crate) struct Output {
     pub(crate) name: String,
     pub(crate) unit: Option<String>,
-    /// Its position among the outputs of a system.
+    /// Position of the output among the outputs of a system.
     pub(crate) row: usize,
 }
 
@@ -64,7 +64,7 @@ pub(crate) fn largest_gain(system: &StateSpace) -> Result<(f64, &'static str), E
     }
 }
 
-/// Returns the singular values of a system at these `frequencies`.
+/// Returns the singular values of `system` at `frequencies`.
 pub(crate) fn frequency(
     name: String,
     system: &StateSpace,
@@ -76,7 +76,7 @@ pub(crate) fn frequency(
     Ok(Frequency { name, frequencies, singular_values })
 }
 
-/// The peak gains of an output from the faults, from their rates, and from the part of the faults that the
+/// Peak gains of one output from the faults, from the rates of the faults, and from the part of the faults that the
 /// compensation leaves; 1 x q each.
 type PeakGains = [RowDVector<f64>; 3];
 
@@ -89,7 +89,7 @@ enum Missing {
     Numerics,
 }
 
-/// The transfer functions from the faults, and from their rates, to [x; e; eps].
+/// Transfer functions to [x; e; eps] from the faults, and from the rates of the faults.
 pub(crate) struct Loops<'a> {
     designed: &'a Solution,
     outputs: Vec<Output>,
@@ -113,11 +113,11 @@ impl<'a> Loops<'a> {
         channels.zip(&designed.linear.faults)
     }
 
-    /// Returns the peak-to-peak gains of each output. For a sampled loop they also hold between the samples, if the
-    /// plant is known in continuous time.
+    /// Returns the peak-to-peak gains of each output. For a sampled loop the gains also bound the outputs between the
+    /// samples, if the plant is known in continuous time.
     ///
-    /// The errors of the faults are computed first, then those of the states, then the states. Outputs for which the
-    /// time of `budget` is too short are [`Missing::Time`].
+    /// Order: errors of the faults, errors of the states, states. An output that is not reached within the time of
+    /// `budget` is [`Missing::Time`].
     fn peak_gains(&self, budget: &Budget) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let positions: Vec<_> = self.outputs.iter().map(|output| output.row).collect();
         let mut peaks = vec![Err(Missing::Time); positions.len()];
@@ -143,8 +143,8 @@ impl<'a> Loops<'a> {
         Ok(peaks)
     }
 
-    /// Returns the gains of the outputs at the positions `rows` in [x; e; eps]. If they do not converge together, each
-    /// output is computed alone, and one that does not converge is [`Missing::Numerics`].
+    /// Returns the gains of the outputs at the positions `rows` in [x; e; eps]. If the common computation does not
+    /// converge, each output is computed alone; an output that does not converge alone is [`Missing::Numerics`].
     fn gains_of(&self, rows: &[usize]) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let Solution { extended, plant, gains, domain, .. } = self.designed;
         let peaks = match (extended.domain, *domain) {
@@ -234,7 +234,7 @@ impl<'a> Loops<'a> {
     }
 
     /// Returns the singular values from the faults to their estimates and to the estimation errors, and from the rates
-    /// of the faults to these errors unless a constant fault leaves a lasting error.
+    /// of the faults to the estimation errors unless a constant fault leaves a lasting error.
     pub(crate) fn frequency(&self) -> Result<Vec<Frequency>, Error> {
         let errors = self.to_fault_errors(&self.of_faults);
         let mut estimates = errors.clone();
@@ -252,8 +252,8 @@ impl<'a> Loops<'a> {
         Ok(curves)
     }
 
-    /// Returns the norms from the rates of the faults to their estimation errors; none if a constant
-    /// fault leaves a lasting error.
+    /// Returns the norms from the rates of the faults to the estimation errors; none if a constant fault leaves a
+    /// lasting error.
     pub(crate) fn norms(&self) -> Result<Vec<Norm>, Error> {
         if self.designed.law.leaks() {
             return Ok(Vec::new());

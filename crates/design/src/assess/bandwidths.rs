@@ -13,8 +13,8 @@ use crate::solve::designed::design;
 use plant_file::requirements::{Bandwidth, Request, Requirement};
 use plant_file::{PlantFile, Sampling};
 
-/// Bandwidths of the feedback relative to the speed of the plant, with those of the observer relative to the feedback,
-/// in the order in which they are tried.
+/// Pairs to try, in this order: bandwidth of the feedback relative to the speed of the plant, bandwidth of the observer
+/// relative to that of the feedback.
 const CANDIDATES: [(f64, f64); 18] = [
     (1.0, 4.0),
     (0.5, 4.0),
@@ -35,7 +35,7 @@ const CANDIDATES: [(f64, f64); 18] = [
     (0.05, 4.0),
     (0.02, 4.0),
 ];
-/// From this number of states on, only the first candidates are examined, without the tolerances.
+/// Number of states from which only the first [`OF_LARGE`] candidates are examined, without the tolerances.
 const LARGE: usize = 24;
 /// Number of candidates for a plant with at least [`LARGE`] states.
 const OF_LARGE: usize = 3;
@@ -43,8 +43,8 @@ const OF_LARGE: usize = 3;
 const TOGETHER: usize = 3;
 /// Eigenvalues smaller than this part of the largest one do not count for the speed of the plant.
 const NO_SPEED: f64 = 1e-9;
-/// Relative change of the entries of A. An eigenvalue whose modulus it changes by half or more is a rounding error and
-/// does not count for the speed, as those of integrators in other coordinates.
+/// Relative change of the entries of A that tests an eigenvalue for the speed of the plant. An eigenvalue whose modulus
+/// changes by half or more is a rounding error of 0, as of integrators in other coordinates, and does not count.
 const LAST_DIGITS: f64 = 1e-9;
 /// Largest bandwidth of the feedback in rad per sample.
 const PER_SAMPLE: f64 = 0.2;
@@ -127,7 +127,7 @@ fn judged(file: &PlantFile<'_>, varies: bool) -> Result<Option<Judged>, Error> {
     if varies { Judged::of(&nominal, Some(&file.robustness)) } else { Ok(judged) }
 }
 
-/// Returns `file` with these bandwidths in rad/s where it leaves them open, at most [`OBSERVER_PER_SAMPLE`] per sample.
+/// Returns `file` with these bandwidths in rad/s where `file` states none, at most [`OBSERVER_PER_SAMPLE`] per sample.
 fn with<'a>(file: &PlantFile<'a>, feedback: f64, observer: f64) -> PlantFile<'a> {
     let most =
         file.sampling.map_or(f64::INFINITY, |sampling| OBSERVER_PER_SAMPLE / sampling.period);

@@ -36,7 +36,7 @@ fn in_time<T>(budget: &Budget, solve: impl FnOnce() -> Result<T, String>) -> Res
     if outcome.is_err() && budget.is_over() { Err(budget.reason()) } else { outcome }
 }
 
-/// Returns the largest norm of a vector whose entries have these bounds; None if a bound is missing.
+/// Returns the largest norm of a vector whose entries have the absolute values `bounds`; None if a bound is missing.
 fn largest(bounds: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let squares = bounds.map(|bound| bound.map(|bound| bound * bound));
     squares.sum::<Option<f64>>().map(f64::sqrt)

@@ -10,7 +10,7 @@ use crate::solve::solution::Solution;
 /// Relative size of the remaining fault effect below which the compensation counts as complete.
 const CANCELLED: f64 = 1e-9;
 
-/// Returns all conditions, with a numerical value where there is one.
+/// Returns all conditions of the design, each with its numerical value if there is one.
 pub(crate) fn checks(designed: &Solution) -> Vec<Check> {
     let mut all = Vec::from(existence(designed));
     let extended = &designed.extended;

@@ -24,15 +24,15 @@ use plant_file::detection::{DetectionRequest, Method};
 use prediction::{Prediction, TestKind};
 use problem::Problem;
 
-/// A test does not react to a fault that moves the means of its residuals by less than this part of the motion that
-/// the tested fault causes.
+/// A test counts as insensitive to a fault that moves the means of the residuals by less than this part of the motion
+/// that the tested fault causes.
 const INSENSITIVE: f64 = 1e-6;
-/// Time constants of the slowest filter after which its initial error is a thousandth.
+/// Number of time constants of the slowest filter after which the initial error of this filter is a thousandth.
 const SETTLING: f64 = 7.0;
-/// Relative excess of the means within the limits of parameters over those at the corners, above which there is a
-/// warning: the brackets of the means have a relative width of 0.01.
+/// Threshold for a warning: relative excess of the largest mean inside the limits of parameters over that at the
+/// corners. The brackets of the means have a relative width of 0.01.
 const NOTICEABLE: f64 = 0.02;
-/// The largest drift: with it a fault of four standard deviations is mostly found in its first sample.
+/// Largest drift of a CUSUM test: a fault of four standard deviations is then mostly found in its first sample.
 const LARGEST_DRIFT: f64 = 2.0;
 
 /// The detection, for the design file and for the report.
@@ -56,14 +56,14 @@ struct PlannedTest {
     kind: TestKind,
     /// The largest norm of the mean of the residuals that model errors cause, in standard deviations.
     bias: f64,
-    /// Relative excess of the largest of these means within the limits of parameters over that at the corners; None
-    /// unless parameters of an FMU vary.
+    /// Relative excess of `bias` inside the limits of parameters over its value at the corners; None unless parameters
+    /// of an FMU vary.
     interior_excess: Option<f64>,
     /// Whether the test reacts to each fault.
     reacts: Vec<bool>,
 }
 
-/// Designs the detection that the plant file asks for; None if it asks for none.
+/// Designs the fault detection that the plant file requests; None without a request.
 pub(crate) fn detection(
     file: &PlantFile<'_>,
     designed: &Designed,

@@ -66,7 +66,7 @@ pub(crate) fn report(
     }))
 }
 
-/// What the cases of the fall-back are examined with.
+/// The examination of the cases of the fall-back.
 struct Examination<'a> {
     cases: Cases<'a>,
     gains: Gains,

@@ -11,13 +11,13 @@ use plant_file::robustness::RobustnessLimits;
 /// The peaks of S of a stable loop, and its stability within the tolerances.
 pub(crate) struct Judged {
     pub(crate) points: Vec<LoopPoint>,
-    /// Whether an unstable loop was found for entries of the plant within their tolerances; false if these were not
-    /// examined. Tolerances of FMU parameters do not count.
+    /// Whether an unstable loop was found for entries of the plant within their tolerances; false if the tolerances
+    /// were not examined. Tolerances of FMU parameters do not count.
     pub(crate) is_unstable: bool,
 }
 
 impl Judged {
-    /// Examines a loop, within the tolerances if they are given; None if it is not stable.
+    /// Examines a loop, within `tolerances` if there are any; None if the nominal loop is not stable.
     pub(crate) fn of(
         solution: &Solution,
         tolerances: Option<&RobustnessLimits>,

@@ -182,7 +182,7 @@ impl Examination<'_> {
         self.stated.iter().map(|loss| loss.up_to).collect()
     }
 
-    /// Returns the stated losses of all actuators together; with several actuators, also those of each alone.
+    /// Returns the stated losses of all actuators together; with several actuators, also of each actuator alone.
     fn boxes(&self) -> Vec<Vec<f64>> {
         let all = self.largest();
         let alone = |at: usize| {
@@ -271,8 +271,8 @@ impl Examination<'_> {
         Ok(all)
     }
 
-    /// Returns the bounds of the states under each disturbance of known size; those without a proof, or without time,
-    /// are left out. `decay`: the proven decay rate.
+    /// Returns the bounds of the states for each disturbance of known size; disturbances without a proof, or without
+    /// time for it, are left out. `decay`: the proven decay rate.
     fn peaks(&self, decay: f64) -> Result<Vec<LossPeak>, Error> {
         let linear = &self.designed.linear;
         let corners = self.lossy.corners(&self.largest());
@@ -341,7 +341,7 @@ impl Examination<'_> {
 struct Disturbance {
     name: String,
     size: f64,
-    /// The column through which it acts on the states of the plant.
+    /// The column through which the disturbance acts on the states of the plant.
     column: DVector<f64>,
 }
 

@@ -232,7 +232,7 @@ fn rise_time(points: &[(f64, f64)]) -> Option<f64> {
     Some(to? - from?)
 }
 
-/// Returns the first time at which a value reaches `level`, by linear interpolation; None if none does.
+/// Returns the first time at which a value reaches `level`, by linear interpolation; None if `level` is not reached.
 fn reaches(points: &[(f64, f64)], level: f64) -> Option<f64> {
     let at = points.iter().position(|point| point.1 >= level)?;
     let (time, value) = points[at];

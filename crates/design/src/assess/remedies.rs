@@ -17,12 +17,12 @@ use plant_file::robustness::RobustnessLimits;
 const FACTORS: [f64; 8] = [SLOWEST, 0.4, 0.6, 0.8, 1.25, 1.7, 2.5, FASTEST];
 const SLOWEST: f64 = 0.25;
 const FASTEST: f64 = 4.0;
-/// A weight of commands or measurements changes by this power of the factor on the speed: that of a double
+/// Exponent with which a weight of commands or measurements changes with the factor on the speed, as for a double
 /// integrator.
 const WEIGHT_POWER: i32 = -4;
-/// Largest number of states for which other designs are tried.
+/// Largest number of states for which changed requirements are tried.
 const LARGEST_ORDER: usize = 24;
-/// A change is worth it if it lowers the peak below this part of its present value.
+/// Part of the present peak of S below which a change must bring this peak to be proposed.
 const LOWER: f64 = 0.95;
 
 /// Returns a remedy for each peak of S above its limit, and for instability within the tolerances. There is none for
@@ -75,14 +75,14 @@ pub(crate) fn remedies(
     reasons.into_iter().filter_map(remedy).collect()
 }
 
-/// A reason of the verdict, and what a change has to reach.
+/// A reason of the verdict, and the aim of a change of the requirements.
 struct Reason {
     text: String,
     aim: Aim,
 }
 
 enum Aim {
-    /// The peak at a point of the loop, by its position, below its limit.
+    /// The peak of S at the point of the loop with this position is at most its limit.
     Peak(usize),
     /// Stability within the tolerances.
     Stable,
@@ -114,7 +114,7 @@ struct Trial {
     lines: Vec<String>,
     words: String,
     judged: Judged,
-    /// The size of the change: the logarithm of the factor, for each loop that it changes.
+    /// The size of the change: the logarithm of the factor, summed over the loops that change.
     distance: f64,
 }
 

@@ -17,8 +17,8 @@ use plant_file::faults::Fault;
 pub(crate) const SETTLED: f64 = 0.02;
 /// Number of parts of a sample time, between which points are shown besides the samples.
 pub(crate) const PARTS: u32 = 5;
-/// Number of parts of the logarithmic time axis, for each of which a curve has at most four points; the second number
-/// is for loops from `LARGE` states on.
+/// Number of parts of the logarithmic time axis; in each part a curve has at most four points. The second number is for
+/// loops with at least [`LARGE`] states.
 const MOST: [usize; 2] = [1000, 250];
 const LARGE: usize = 48;
 

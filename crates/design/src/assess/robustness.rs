@@ -101,7 +101,7 @@ pub(crate) fn robustness(
 /// The margins of a loop, and the effect of measurement noise in it.
 pub(crate) struct Margins {
     pub(crate) points: Vec<LoopPoint>,
-    /// Delay margin and longest hold, s; the latter is NaN for a plant that is known in its samples only.
+    /// Delay margin and longest hold, s; the longest hold is NaN for a plant that is known in its samples only.
     pub(crate) delay: f64,
     pub(crate) hold: f64,
     pub(crate) noise: Matrix,
@@ -287,8 +287,8 @@ fn disk(margin: &DiskMargin) -> Disk {
     }
 }
 
-/// Returns the norms of the gains, and the peaks of S, beside those of a linear-quadratic design of the same speed, as
-/// far as there is one.
+/// Returns the norms of the gains, and the peaks of S, beside the values of a linear-quadratic design of the same
+/// speed, if there is one.
 fn comparison(
     designed: &Solution,
     physical: &Physical,

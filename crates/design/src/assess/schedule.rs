@@ -17,9 +17,9 @@ use crate::solve::schedule::{Scheduled, ScheduledLoop, coupled};
 use crate::solve::solution::Solution;
 use plant_file::robustness::RobustnessLimits;
 
-/// Number of equal parts of each interval between points of the schedule, at whose ends eigenvalues are computed.
+/// Number of equal parts of each interval between points of the schedule; eigenvalues are computed at their ends.
 const CHECKED: u32 = 20;
-/// An eigenvalue this near to the stability limit counts as one on it, because of rounding errors.
+/// Distance from the stability limit within which an eigenvalue counts as on the limit, because of rounding errors.
 const NEUTRAL: f64 = 1e-7;
 
 /// Returns the report on the schedule of `designed`; None if it has none.

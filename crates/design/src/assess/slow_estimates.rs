@@ -9,14 +9,14 @@ use plant_file::PlantFile;
 use plant_file::requirements::Requirement;
 use plant_file::signals::joined;
 
-/// An estimate that decays slower than this part of the slowest mode of the feedback is too slow for it.
+/// Decay rate of an estimate, relative to the slowest mode of the feedback, below which the estimate is too slow.
 const SLOW: f64 = 0.05;
 /// A mode has settled within 2 % after this many time constants.
 const SETTLED: f64 = 4.0;
 
-/// Returns a warning if the slowest mode of the observer is much slower than that of the feedback: a combination of
-/// states and faults hardly acts on the measurements, or has little noise in W. Only observers by weights or by a
-/// bandwidth are examined.
+/// Returns a warning if the slowest mode of the observer is much slower than the slowest mode of the feedback: a
+/// combination of states and faults hardly acts on the measurements, or has little noise in W. Only observers by
+/// weights or by a bandwidth are examined.
 pub(crate) fn warning(file: &PlantFile<'_>, solution: &Solution) -> Result<Option<String>, Error> {
     let requirement = &file.observer.requirement;
     if !matches!(requirement, Requirement::Bandwidth(_) | Requirement::Weights { .. }) {

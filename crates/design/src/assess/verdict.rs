@@ -33,7 +33,7 @@ pub(crate) fn verdict(
     verdict
 }
 
-/// Returns the sentence about a peak of S above a limit, with the level of the verdict; None if it is within the
+/// Returns the sentence about a peak of S above a limit, with the level of the verdict; None if the peak is within the
 /// limits.
 pub(crate) fn peak_reason(point: &LoopPoint, limits: &RobustnessLimits) -> Option<(Level, String)> {
     peak_reason_with(point, "", limits)

@@ -126,8 +126,8 @@ fn state_operating_point(table: &mut Table, key: &str, signals: &[Signal]) {
     }
 }
 
-/// Replaces `input` of each disturbance by its column E of the `n` states; false if one acts on a measurement or on the
-/// state of a delay.
+/// Replaces `input` of each disturbance by its column E of the `n` states; false if a disturbance acts on a measurement
+/// or on the state of a delay.
 fn state_columns(disturbances: &mut [Value], inputs: &[UnknownInput], n: usize) -> bool {
     for (disturbance, input) in disturbances.iter_mut().zip(inputs) {
         let Some(stated) = disturbance.as_table_mut() else { continue };

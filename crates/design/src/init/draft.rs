@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::DMatrix;
 use plant_file::signals::Signal;
 
-/// A plant for which a plant file is written.
+/// A plant, before its plant file is written.
 pub(super) struct Draft {
     /// The source of the plant, in one line.
     pub(super) origin: String,

@@ -89,8 +89,8 @@ pub(super) fn draft(paths: &[PathBuf], options: &LogOptions) -> Result<Draft, Er
     })
 }
 
-/// Returns the states: the measurements, then the rates of those at the positions `rates`, without a unit if FMI has
-/// none (degC/s). Without `rates` their names are `x1`, `x2` and so on.
+/// Returns the states: the measurements, then the rates of the measurements at the positions `rates`, without a unit if
+/// FMI has none (degC/s). Without `rates` their names are `x1`, `x2` and so on.
 fn states(rates: Option<&[usize]>, outputs: &[Signal], order: usize) -> Vec<Signal> {
     let Some(rates) = rates else {
         return (1..=order).map(|at| Signal::named(format!("x{at}"))).collect();

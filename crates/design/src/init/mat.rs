@@ -98,7 +98,7 @@ fn not_read(content: &MatFile) -> Option<String> {
     })
 }
 
-/// Returns the matrix of this name; None if the file has none, an error if it is no finite real matrix.
+/// Returns the matrix called `name`; None if the file has none, an error if the variable is no finite real matrix.
 fn matrix(content: &MatFile, name: &str) -> Result<Option<DMatrix<f64>>, String> {
     let Some(array) = content.find_by_name(name) else { return Ok(None) };
     macro_rules! numbers {

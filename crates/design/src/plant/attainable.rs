@@ -140,7 +140,7 @@ fn of_zero(
     Some(file.error_at(&file.feedback.place, message))
 }
 
-/// Returns the peak of S that a zero forces beside unstable poles; 1 without them.
+/// Returns the peak of S that a zero forces beside unstable `poles`; 1 without unstable poles.
 fn forced(zero: Complex<f64>, poles: &[Complex<f64>]) -> f64 {
     poles.iter().map(|pole| (zero + pole.conj()).norm() / (zero - pole).norm()).product()
 }

@@ -54,8 +54,8 @@ pub(crate) fn of(file: &PlantFile<'_>) -> Delays {
     Delays { inputs: all(&file.actuators), outputs: all(&file.measurements) }
 }
 
-/// The matrices of a plant with the states of its delays and filters; F and G are those of its fault inputs, which are
-/// not delayed.
+/// The matrices of a plant with the states of its delays and filters; F and G are the columns of the fault inputs,
+/// which are not delayed.
 pub(crate) struct DelayedPlant {
     pub(crate) a: DMatrix<f64>,
     pub(crate) b: DMatrix<f64>,
@@ -97,7 +97,7 @@ pub(crate) fn with_delays(
     filtered.map_err(|error| file.error(&["actuators", "measurements"], error.to_string()))
 }
 
-/// Converts the tolerances of a plant without its delays to those of the plant with delays of `order` states each.
+/// Converts the tolerances of a plant without its delays to tolerances of the plant with delays of `order` states each.
 pub(crate) fn placed(delays: &Delays, order: usize, tolerances: Tolerances) -> Tolerances {
     if !delays.any() {
         return tolerances;

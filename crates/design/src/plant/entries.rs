@@ -8,9 +8,9 @@ use plant_file::robustness::RobustnessLimits;
 
 /// The tolerances of a plant file.
 pub(crate) struct EntryTolerances {
-    /// In the plant without its delays.
+    /// Tolerances of the plant without its delays.
     pub(crate) stated: Tolerances,
-    /// In the plant whose delays have `order` states each.
+    /// Tolerances of the plant whose delays have `order` states each.
     pub(crate) placed: Tolerances,
 }
 

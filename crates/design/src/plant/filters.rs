@@ -89,7 +89,7 @@ pub(crate) fn with_filters(pid: &Pid, plant: &StateSpace) -> Result<StateSpace, 
 
 /// Replaces the filters of a plant that was sampled with them by filters of the samples of its measurements.
 ///
-/// `c`: of the plant with the filters, p x n.
+/// `c`: C of the plant with the filters, p x n.
 pub(crate) fn sample(
     pid: &Pid,
     plant: &mut FaultyPlant,

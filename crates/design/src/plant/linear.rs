@@ -50,7 +50,7 @@ pub(crate) struct LinearPlant {
     pub(crate) domain: Domain,
     /// The models of `faults`, in the same order.
     pub(crate) models: Vec<Model>,
-    /// How the disturbances of the file act, in their order.
+    /// Where the disturbances of the file act, in the order of the file.
     pub(crate) disturbances: Vec<UnknownInput>,
     /// The plant without the states of delays and filters.
     pub(crate) undelayed: StateSpace,
@@ -60,9 +60,9 @@ pub(crate) struct LinearPlant {
     pub(crate) delay_order: usize,
     /// The source of the matrices, in a sentence.
     pub(crate) origin: String,
-    /// For an FMU: the relative distance of the operating point from an equilibrium.
+    /// Relative distance of the operating point from an equilibrium, for an FMU.
     pub(crate) residual: Option<f64>,
-    /// For an FMU: the largest error of an entry, relative to the largest entry of its row; None if none is known.
+    /// Largest error of an entry relative to the largest entry of its row, for an FMU; None if no error is known.
     pub(crate) inaccuracy: Option<f64>,
 }
 
@@ -116,7 +116,7 @@ impl LinearPlant {
         self.delays.approximated(&self.undelayed, delays::JUDGED)
     }
 
-    /// Returns the states without those of delays and filters.
+    /// Returns the states of the plant without the states of delays and filters.
     pub(crate) fn plant_states(&self) -> &[Signal] {
         &self.states[..self.undelayed.a.nrows()]
     }
@@ -294,7 +294,7 @@ fn linearised(
     })
 }
 
-/// Checks that the units that the file states for signals of the FMU are those of the FMU, which the matrices have.
+/// Checks that the units in the file for signals of the FMU equal the units in the FMU, which the matrices have.
 fn check_units(
     file: &PlantFile<'_>,
     signals: &[Signal],
@@ -419,7 +419,7 @@ fn linearisation(
     Ok((format!("{} ({name})", fmu.description().model_name), linearised))
 }
 
-/// Returns the entry of the file that names this variable of the FMU; that of the faults for any other variable.
+/// Returns the entry of the file that names the FMU's variable `name`; the entry of the faults for other variables.
 fn stating(file: &PlantFile<'_>, operating_point: &[(String, f64)], name: &str) -> &'static str {
     let among = |signals: &[Signal]| signals.iter().any(|signal| signal.name == name);
     if operating_point.iter().any(|(variable, _)| variable == name) {

@@ -10,7 +10,7 @@ use control::faults::ExtendedPlant;
 use plant_file::signals::{joined, signal_names};
 use plant_file::{FAULTS, PlantFile};
 
-/// A column of length one counts as a combination of others if its part orthogonal to them has at most this length.
+/// Largest part orthogonal to other columns with which a column of length one counts as a combination of them.
 const DEPENDENT: f64 = 1e-10;
 /// Coefficients of a combination below this, relative to the largest, count as zero.
 const NEGLIGIBLE: f64 = 1e-6;

@@ -17,7 +17,7 @@ pub(crate) struct Designed {
     pub(crate) family: Option<Family>,
     /// The controllers at the points of the schedule, if the file states one.
     pub(crate) schedule: Option<Scheduled>,
-    /// What is unusual in the plant file, with its place.
+    /// Warnings about the plant file, with their places.
     pub(crate) warnings: Vec<PlaceError>,
 }
 

@@ -41,7 +41,7 @@ const FASTER: [f64; 3] = [1.0, 1.5, 2.25];
 pub(crate) struct Fallback {
     /// m x n, for the states of the model in the observer.
     pub(crate) k_x: DMatrix<f64>,
-    /// The compensation, if the loop with it meets the requirement in all cases.
+    /// The gain of the compensation, m x q, if the loop with compensation meets the requirement in all cases.
     pub(crate) k_f: Option<DMatrix<f64>>,
     /// The required region, and the proof for the state feedback.
     pub(crate) region: Region,
@@ -49,11 +49,11 @@ pub(crate) struct Fallback {
     pub(crate) method: String,
 }
 
-/// Designs the fall-back that the plant file asks for; None if it asks for none.
+/// Designs the fall-back that the plant file requests; None without a request.
 ///
 /// # Errors
 ///
-/// [`crate::Error`] at the entry of the plant file if there is none, with the actuators that are in conflict.
+/// [`crate::Error`] at the entry of the plant file if no fall-back exists, with the actuators that are in conflict.
 pub(crate) fn fallback(
     file: &PlantFile<'_>,
     designed: &Solution,

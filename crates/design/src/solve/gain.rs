@@ -19,7 +19,7 @@ pub(crate) struct GainResult {
     pub(crate) required: Vec<Complex<f64>>,
     /// The quality of an eigenvalue assignment.
     pub(crate) quality: Option<Quality>,
-    /// The H-infinity norm, if the gain was designed by it.
+    /// The H-infinity norm, if the gain minimises or bounds it.
     pub(crate) norm: Option<NormReport>,
     /// The noise of a Kalman filter.
     pub(crate) noise: Option<Box<Noise>>,
@@ -40,7 +40,7 @@ pub(crate) struct Noise {
     pub(crate) is_relative: bool,
 }
 
-/// The gains that assign the same eigenvalues; the one whose closed loop has the lowest peaks of S is used.
+/// The gains that assign the same eigenvalues, from which the gain with the lowest peaks of S of the loop is chosen.
 #[derive(Clone)]
 pub(crate) struct GainChoice {
     /// See [`control::placement::Alternatives::candidates`].
@@ -70,7 +70,7 @@ pub(crate) struct FeedbackProblem<'a> {
     pub(crate) a: &'a DMatrix<f64>,
     pub(crate) b: &'a DMatrix<f64>,
     pub(crate) c: &'a DMatrix<f64>,
-    /// Number of states of the plant; those after it are integrals of references.
+    /// Number of states of the plant, before the integrals of references.
     pub(crate) states: usize,
     pub(crate) f_a: &'a DMatrix<f64>,
 }

@@ -31,11 +31,11 @@ pub(crate) struct GainProblem<'a> {
     pub(crate) domain: Domain,
 }
 
-/// Where the search for the shape of a loop starts, and what it varies.
+/// Starts of the search for the shape of a loop, and the entries of the gains that vary.
 struct Search {
     /// Pairs of feedback and observer gains.
     starts: Vec<[DMatrix<f64>; 2]>,
-    /// The rows and columns of their entries that are tuned.
+    /// Rows and columns of the entries of feedback and observer that are tuned.
     free: [Vec<(usize, usize)>; 2],
 }
 
@@ -146,8 +146,8 @@ impl GainProblem<'_> {
         shape.starts(self.domain).into_iter().map(gains).collect()
     }
 
-    /// Returns where the search starts for the structure of the file, a state feedback or controllers of low order, and
-    /// what it varies.
+    /// Returns the starts of the search for the structure of the file, a state feedback or controllers of low order,
+    /// and the entries that vary.
     fn search(&self, shape: &LoopShape) -> Result<Search, crate::Error> {
         let Self { file, linear, pair, domain, .. } = *self;
         let starts = self.starts(shape)?;

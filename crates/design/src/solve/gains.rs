@@ -18,8 +18,8 @@ use crate::solve::norm_gains::{NormRequirement, ObserverProblem};
 use plant_file::requirements::Requirement;
 
 const IN_REGION: &str = "Eigenvalues in the region by linear matrix inequalities";
-/// Relative distance within which a requested eigenvalue is that of a mode that no gain moves; relative to 1 for
-/// `sampled_eigenvalues`, if the mode is within the unit circle.
+/// Relative distance within which a requested eigenvalue counts as that of a mode that no gain moves. For
+/// `sampled_eigenvalues` and a mode within the unit circle the distance is relative to 1.
 const SAME: f64 = 1e-4;
 
 /// Computes K of u = K x.
@@ -64,7 +64,7 @@ pub(crate) fn feedback(
     }
 }
 
-/// Computes L of the observer. For a current estimator it is the gain of the correction.
+/// Computes L of the observer, for a current estimator the gain of the correction.
 ///
 /// Modes that the measurements do not show keep their eigenvalues, which the requirement must allow.
 pub(crate) fn observer(
@@ -190,7 +190,7 @@ fn assigned(alternatives: &Alternatives, required: &[Complex<f64>]) -> GainResul
     }
 }
 
-/// Returns the results of an assignment of the movable part, without quality, which would be that of this part alone.
+/// Returns the results of an assignment of the movable part, without the quality, which holds for this part alone.
 fn partly_assigned(
     alternatives: &Alternatives,
     required: &[Complex<f64>],

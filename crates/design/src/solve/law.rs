@@ -21,10 +21,10 @@ const KEPT: f64 = 0.99;
 /// The default of rho, relative to the bound of the fault.
 const REACH: f64 = 2.0;
 
-/// gamma relative to the mean rate, and the mean rate relative to sigma, by default.
+/// Default ratio of the fast adaptive law's gamma to the mean rate, and of the mean rate to the sigma of the law.
 const APART: f64 = 1.25;
 
-/// What a law is designed from.
+/// The data from which a law is designed.
 pub(crate) struct LawProblem<'a> {
     pub(crate) linear: &'a LinearPlant,
     /// The plant with fault models and measurement filter, in continuous time unless it is known in its samples only.
@@ -39,9 +39,9 @@ pub(crate) struct LawProblem<'a> {
 /// A designed law.
 pub(crate) struct DesignedLaw {
     pub(crate) law: Law,
-    /// The gains; of a sliding-mode law those of its linearisation.
+    /// The gains; for a sliding-mode law the gains of its linearisation.
     pub(crate) gains: Gains,
-    /// `A_f` of the observer, if it is not that of the fault model.
+    /// `A_f` of the observer, if it differs from the fault model.
     pub(crate) a_f: Option<DMatrix<f64>>,
     pub(crate) injection: Option<Injection>,
     /// The parameters with their values.
@@ -59,7 +59,7 @@ pub(crate) struct Injection {
 }
 
 impl DesignedLaw {
-    /// Whether the error dynamics are those of the requirement.
+    /// Whether the observer with this law keeps the error dynamics that the requirement assigns.
     pub(crate) fn keeps_error_dynamics(&self) -> bool {
         matches!(self.law, Law::Augmented | Law::ProportionalIntegral { .. })
     }

@@ -20,23 +20,23 @@ use plant_file::loop_shape::LoopShape;
 use plant_file::references::References;
 use plant_file::signals::same_unit;
 
-/// Smallest |S| that is required at low frequencies, and smallest |T| at high ones, relative to its peak.
+/// Smallest |S| required at low frequencies, relative to the peak of S; the same for |T| at high frequencies.
 const FLOOR: f64 = 0.01;
-/// Number of starts that are tuned: those with the lowest gamma, the largest weighted gain over all terms.
+/// Number of starts to tune: the starts with the lowest gamma, the largest weighted gain over all terms.
 const TUNED: usize = 4;
 /// Smallest decay rate of the tuned loop, relative to that of its start.
 const DECAY: f64 = 0.1;
-/// [`DECAY`] with integral action beside a feedforward: no term shows how slowly a set point is followed.
+/// In place of [`DECAY`] with integral action beside a feedforward: no term limits how slowly set points are followed.
 const DECAY_OF_INTEGRALS: f64 = 0.9;
-/// [`DECAY`] of the estimation errors with integral action: no term shows how slowly the observer estimates a fault
-/// that the integrals compensate.
+/// In place of [`DECAY`] for the estimation errors with integral action, where no term limits how slowly the observer
+/// estimates a fault that the integrals compensate.
 const DECAY_OF_ESTIMATES: f64 = 0.5;
-/// Smallest size of an entry of a gain, relative to the average of its row and its column.
+/// Smallest scale of an entry of a gain in the search, relative to the average of its row and its column.
 const SMALLEST: f64 = 0.1;
-/// Part of half the sampling rate up to which the roll-off is required.
+/// Largest frequency at which the roll-off is required, relative to half the sampling rate.
 const BELOW_NYQUIST: f64 = 0.8;
 
-/// What the gains are tuned for.
+/// The loop to shape, and the gains to tune.
 pub(crate) struct LoopProblem<'a, G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> {
     pub(crate) shape: &'a LoopShape,
     pub(crate) model: LoopModel<'a>,
@@ -44,7 +44,7 @@ pub(crate) struct LoopProblem<'a, G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains +
     pub(crate) references: Option<&'a References>,
     /// The rows and columns of the entries of feedback and observer that are tuned.
     pub(crate) free: [Vec<(usize, usize)>; 2],
-    /// The gains of the controller from those of feedback and observer.
+    /// Computes the gains of the controller from the gains of feedback and observer.
     pub(crate) gains: G,
 }
 
@@ -55,7 +55,7 @@ pub(crate) struct ShapedGains {
     pub(crate) warning: Option<String>,
 }
 
-/// Units in which the channels are comparable: sizes of commands, inverse sizes of measurements and references.
+/// Scales with which the channels are comparable: sizes of commands, inverse sizes of measurements and references.
 struct Units {
     commands: DMatrix<f64>,
     measurements: DMatrix<f64>,
@@ -145,7 +145,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         DVector::from_vec(entries.collect())
     }
 
-    /// Returns the gains with these parameters; their other entries are those of `others`.
+    /// Returns the gains with the tuned entries from `parameters` and the remaining entries from `others`.
     fn divided(&self, parameters: &DVector<f64>, others: &[DMatrix<f64>; 2]) -> [DMatrix<f64>; 2] {
         let mut gains = others.clone();
         let mut parameters = parameters.iter();
@@ -206,7 +206,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
     }
 
     /// Returns the plant of the verdict, sampled for a sampled design, in units in which its channels are comparable:
-    /// those of the file if all commands have one unit and all measurements have one, otherwise natural ones.
+    /// the units of the file if all commands have one unit and all measurements have one unit, otherwise natural units.
     fn scaled_plant(&self) -> Result<(Units, StateSpace), Error> {
         let plant = self.model.linear.judged()?;
         let LinearPlant { actuators, measurements, .. } = self.model.linear;

@@ -24,7 +24,7 @@ pub(crate) fn state_name(linear: &LinearPlant, state: usize) -> &str {
     signal.map_or("", |signal| signal.name.as_str())
 }
 
-/// Returns the names of the states of the feedback: those of the plant, then with integral action the integrals.
+/// Returns the names of the states of the feedback: the states of the plant, then, with integral action, the integrals.
 pub(crate) fn feedback_states(file: &PlantFile<'_>, linear: &LinearPlant) -> Vec<String> {
     let integrals = file.references.iter().filter(|references| references.integral);
     let integrals = integrals.flat_map(|references| &references.signals);

@@ -22,14 +22,14 @@ use plant_file::requirements::Region;
 
 /// Ratio of the upper to the lower bound between which the least norm of any filter is searched.
 const RANGE: f64 = 1e6;
-/// Ratio of these bounds at which the search ends.
+/// Ratio of the upper to the lower bound of the least norm at which the search ends.
 const NARROW: f64 = 1.02;
-/// The bound for which a filter is designed, relative to the least one, near which the gain grows without limit.
+/// Bound for which a filter is designed, relative to the least bound, near which the gain grows without limit.
 const RELAXED: f64 = 1.1;
-/// The norm of such a filter, relative to its bound, above which it is not used.
+/// Norm of a filter by the Riccati equation, relative to its bound, above which the filter is not used.
 const ROUNDED: f64 = 1.05;
 
-/// The augmented dynamics, and what the channel of the observer depends on.
+/// The augmented dynamics, and the data of the channel of the observer.
 pub(crate) struct ObserverProblem<'a> {
     /// `A_0`, the dynamics of the plant with the models of its faults.
     pub(crate) a_0: &'a DMatrix<f64>,
@@ -41,7 +41,7 @@ pub(crate) struct ObserverProblem<'a> {
     pub(crate) channels: &'a [FaultChannel],
     /// Number of states of the fault models, the last states.
     pub(crate) faults: usize,
-    /// Coefficients of the measurement filter, whose states come before those of the faults.
+    /// Coefficients of the measurement filter, whose states precede the states of the faults.
     pub(crate) filter: Option<&'a [f64]>,
     pub(crate) estimator: Estimator,
 }
@@ -158,9 +158,9 @@ impl ObserverProblem<'_> {
         Ok((norm(&gain)? <= ROUNDED * RELAXED * high).then_some(gain))
     }
 
-    /// Computes a lower bound of the norm for all gains: with noise that of filters of any order; without noise the
-    /// larger one of that and of the bound for gains with all eigenvalues in the disc of the region. None if no bound
-    /// is known.
+    /// Computes a lower bound of the norm for all gains: with noise the bound for filters of any order; without noise
+    /// the larger one of this bound and the bound for gains with all eigenvalues in the disc of the region. None if no
+    /// bound is known.
     fn lower_bound(&self, required: NormRequirement<'_>) -> Result<Option<LowerBound>, Error> {
         if !required.channel.noise.is_empty() {
             return Ok(self.noisy_lower_bound(required)?.map(LowerBound::for_filters));
@@ -232,7 +232,7 @@ impl ObserverProblem<'_> {
         }
     }
 
-    /// Returns A, C and the performance of [`Self::performance`], extended by the states of its weights, if there are
+    /// Returns A, C and the performance of [`Self::performance`], extended by the states of the weights, if there are
     /// any.
     fn extended(
         &self,

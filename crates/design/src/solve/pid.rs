@@ -30,7 +30,7 @@ pub(crate) struct PidProblem<'a> {
     pub(crate) domain: Domain,
 }
 
-/// The columns of the gains of a controller in its row of the feedback, [`K_x`, `K_i`].
+/// The columns of one controller's gains in the row of its command, in the feedback [`K_x`, `K_i`].
 pub(crate) struct Columns {
     pub(crate) proportional: usize,
     /// The columns of the rate of the filtered measurement, then of its higher derivatives.
@@ -119,7 +119,7 @@ impl PidProblem<'_> {
     }
 }
 
-/// Returns the columns of the controller from `measurement`, for a plant whose `states` end with those of the filters.
+/// Returns the columns of the controller from `measurement`, for a plant of `states` states including the filters.
 pub(crate) fn columns(
     pid: &Pid,
     references: &References,

@@ -27,12 +27,12 @@ use plant_file::reconfiguration::ReconfigurationRequest;
 use plant_file::requirements::Requirement;
 use plant_file::signals::Signal;
 
-/// Relative size of the effect that the other actuators cannot produce below which the allocation counts
-/// as exact.
+/// Size of the effect that the other actuators cannot produce, relative to the lost effect, below which the allocation
+/// counts as exact.
 const EXACT: f64 = 1e-9;
 /// Deviation of the kept measurements, relative to the size of C and x, that counts as none.
 const KEPT: f64 = 1e-9;
-/// Largest number of pairs whose loop with the fall-back is reported.
+/// Largest number of pairs of actuators for which the report has the loop with the fall-back.
 const MOST_PAIRS: usize = 64;
 
 /// The gains of `[[reconfigurations]]`, `[[combinations]]` and `[fallback]` of the design file.
@@ -51,13 +51,13 @@ pub(crate) struct Reconfiguration {
     pub(crate) gains: Option<ReconfiguredGains>,
     /// The states of the fault model that restart at 0.
     pub(crate) restart: Vec<usize>,
-    /// Loss and time, in s: the actuator counts as gone after its estimated loss was larger for this time.
+    /// Threshold of the estimated loss, and the time in s above it after which the actuator counts as gone.
     pub(crate) decision: Option<(f64, f64)>,
 }
 
 /// The controller for several actuators that are gone.
 pub(crate) struct Combination {
-    /// In ascending order.
+    /// The actuators that are gone, ascending.
     pub(crate) gone: Vec<usize>,
     pub(crate) gains: ReconfiguredGains,
 }
@@ -128,13 +128,13 @@ pub(crate) fn reconfigurations(
 struct Without<'a> {
     designed: &'a Solution,
     request: &'a ReconfigurationRequest,
-    /// In ascending order.
+    /// The actuators that are gone, ascending.
     gone: Vec<usize>,
 }
 
 /// Feedbacks that meet the same requirement.
 struct Feedbacks {
-    /// At least one in the first list; those of the second are used only if they are better.
+    /// At least one feedback in the first list; the second list is used only if its loops are better.
     all: [Vec<DMatrix<f64>>; 2],
     /// The feedbacks of the standard methods, if there is a choice.
     standard: Vec<DMatrix<f64>>,
@@ -197,7 +197,7 @@ impl Without<'_> {
     }
 
     /// Returns the gains of the feedback whose loop has the lowest peaks of S, with the equilibrium. The observer is
-    /// that of the intact plant.
+    /// the one for the intact plant.
     fn chosen(
         &self,
         feedbacks: &Feedbacks,
@@ -385,7 +385,7 @@ impl Without<'_> {
         faults.filter(move |(fault, _)| acts(&fault.entry_point)).map(|(_, channel)| *channel)
     }
 
-    /// Returns the states of the fault model that restart: those of the faults of the actuators that are gone.
+    /// Returns the states of the fault model that restart: the states of the faults of the actuators that are gone.
     fn restarted(&self) -> Vec<usize> {
         let faults = self.gone.iter().flat_map(|gone| self.faults_of(*gone));
         faults.flat_map(|channel| [Some(channel.estimate), channel.rate]).flatten().collect()

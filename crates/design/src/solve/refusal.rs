@@ -16,7 +16,7 @@ use crate::solve::names::feedback_states;
 /// The states that a gain is for.
 pub(crate) struct States {
     pub(crate) names: Vec<String>,
-    /// What they are, in words.
+    /// Kind of the states, in words for a message.
     pub(crate) meaning: &'static str,
     /// The positions of the states of delays and filters, for which a plant file states no weights.
     pub(crate) of_delays: Range<usize>,
@@ -43,7 +43,7 @@ pub(crate) fn feedback_refused(
     refused(file, domain, &file.feedback, refusal, &states)
 }
 
-/// Converts the refusal of a gain to an error at the requirement in the file; `states`: those that the gain is for.
+/// Converts the refusal of a gain for `states` to an error at the requirement in the file.
 pub(crate) fn refused(
     file: &PlantFile<'_>,
     domain: Domain,

@@ -35,7 +35,7 @@ pub(crate) struct Scheduled {
     pub(crate) measurement: Option<usize>,
     /// Largest rate of the variable, per s.
     pub(crate) rate_bound: Option<f64>,
-    /// Values of the variable, ascending, each with its design: None for the plant of the file.
+    /// Values of the scheduling variable, ascending, with their designs; None as design for the plant of the file.
     points: Vec<(f64, Option<Solution>)>,
 }
 
@@ -49,8 +49,8 @@ struct Point {
 }
 
 impl Scheduled {
-    /// Designs the controller with `law` at each point of the schedule of `file`, except that of the file's own plant;
-    /// None without a schedule.
+    /// Designs the controller with `law` at each point of the schedule of `file`, except the point of the file's own
+    /// plant; None without a schedule.
     pub(crate) fn of(
         file: &PlantFile<'_>,
         law: &Law,
@@ -91,7 +91,7 @@ impl Scheduled {
         self.points.iter().map(move |(at, solution)| (*at, solution.as_ref().unwrap_or(nominal)))
     }
 
-    /// Returns the points besides that of the plant of the file.
+    /// Returns the points except that of the plant of the file.
     pub(crate) fn others(&self) -> impl Iterator<Item = (f64, &Solution)> {
         self.points.iter().filter_map(|(at, solution)| Some((*at, solution.as_ref()?)))
     }

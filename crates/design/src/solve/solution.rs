@@ -56,7 +56,7 @@ pub(crate) struct Solution {
     pub(crate) cancellation_residual: f64,
     /// The set points of measurements, if there are any.
     pub(crate) tracking: Option<Tracking>,
-    /// A and B of the feedback: those of the plant, with integral action followed by the integrals.
+    /// A and B of the plant for the state feedback; with integral action the integrals follow the states of the plant.
     pub(crate) feedback_pair: (DMatrix<f64>, DMatrix<f64>),
     /// The plant and the linear controller from its measurements to its commands.
     pub(crate) whole: DesignLoop,
@@ -69,12 +69,12 @@ pub(crate) struct Solution {
     pub(crate) instability_before: Option<f64>,
 }
 
-/// The controller of the plant of a file, and what it was solved with.
+/// The controller of the plant of a file, with the family that it serves and the warnings.
 pub(crate) struct SolveResult {
     pub(crate) solution: Solution,
     /// The plants that the controller serves besides the one of the file.
     pub(crate) family: Option<Family>,
-    /// What is unusual in the plant file, with its place.
+    /// Warnings about the plant file, with their places.
     pub(crate) warnings: Vec<PlaceError>,
 }
 
@@ -199,8 +199,8 @@ fn feedback_of_family(
     }
 }
 
-/// Returns the instability of plant and controller; with delays the larger one for two plants: that of the design, and
-/// that of the verdict, which approximates delays better.
+/// Returns the instability of plant and controller; with delays the larger one for two plants: the plant of the design,
+/// and the plant of the verdict, which approximates delays better.
 fn instability_of(model: LoopModel<'_>, gains: &Gains, whole: &DesignLoop) -> Result<f64, Error> {
     let LoopModel { linear, plant, domain, .. } = model;
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
@@ -297,8 +297,8 @@ impl Solution {
         LoopModel { linear, plant, filter: filter.as_deref(), domain: *domain }
     }
 
-    /// Returns A + B K_x, n x n, the dynamics under exact state feedback; with integral action the same of
-    /// the plant extended by the integrals, with [K_x, K_i].
+    /// Returns A + B K_x, n x n, the dynamics under exact state feedback; with integral action the dynamics of the
+    /// plant extended by the integrals, with [K_x, K_i].
     pub(crate) fn feedback_dynamics(&self) -> DMatrix<f64> {
         &self.feedback_pair.0 + &self.feedback_pair.1 * &self.feedback.gain
     }

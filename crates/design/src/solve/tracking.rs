@@ -26,7 +26,7 @@ pub(crate) const REACHED: f64 = 1e-9;
 
 /// The references of a design.
 pub(crate) struct Tracking {
-    /// With operating points and units.
+    /// The references, with operating points and units.
     pub(crate) signals: Vec<Signal>,
     /// The size of the step of each reference that the report shows, if stated.
     pub(crate) steps: Vec<Option<f64>>,
@@ -45,15 +45,15 @@ pub(crate) enum TrackingAction {
         windup: Option<DMatrix<f64>>,
         /// Time constant of the back-calculation, s.
         windup_time: f64,
-        /// N_r and the modes that it leaves at rest, if there is a feedforward beside the integrals.
+        /// N_r and the modes that N_r does not excite, if there is a feedforward beside the integrals.
         feedforward: Option<IntegralFeedforward>,
     },
     /// N_r, m x t, from the references to the commands.
     Feedforward(DMatrix<f64>),
 }
 
-/// Checks that the reference of a measurement has its unit, that the plant can hold each reference at every constant
-/// value, and that integral action with `h_infinity` has a required decay rate.
+/// Checks that the reference of a measurement has the unit of the measurement, that the plant can hold each reference
+/// at every constant value, and that integral action with `h_infinity` has a required decay rate.
 pub(crate) fn check_references(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
@@ -143,8 +143,8 @@ pub(crate) fn check_member(
     Err(file.error_at(&variant.place, message))
 }
 
-/// Returns A and B of the system that the state feedback controls: those of the plant; if the references have integral
-/// action, extended by the integrals as last states. `plant`: A, B and C.
+/// Returns A and B of the system that the state feedback controls: the plant, extended by the integrals as last states
+/// if the references have integral action. `plant`: A, B and C.
 pub(crate) fn feedback_pair(
     references: Option<&References>,
     plant: [&DMatrix<f64>; 3],
@@ -180,7 +180,7 @@ pub(crate) fn integral_action(
     })
 }
 
-/// What the action of the references is computed for.
+/// The data for which the action of the references is computed.
 pub(crate) struct TrackingProblem<'a> {
     pub(crate) file: &'a PlantFile<'a>,
     pub(crate) linear: &'a LinearPlant,
@@ -195,7 +195,7 @@ pub(crate) struct TrackingProblem<'a> {
 }
 
 impl TrackingProblem<'_> {
-    /// Returns the references of the file and how they act; None if it has none.
+    /// Returns the references of the file and their action; None if the file has no references.
     pub(crate) fn solve(&self) -> Result<Option<Tracking>, PlaceError> {
         let Self { file, linear, a, b, gains, feedback, domain } = *self;
         let Some(references) = &file.references else { return Ok(None) };

@@ -1,4 +1,4 @@
-//! A filter with the unknown inputs that it decouples, exactly or as random walks.
+//! A residual filter with the unknown inputs that it decouples, exactly or as random walks.
 
 use control::detection::{DetectionFilter, detection_filter, mean_after_step, mean_of_constant};
 use control::{Domain, Error, StateSpace};
@@ -14,8 +14,8 @@ use plant_file::PlantFile;
 const SETTLED: f64 = 15.0;
 /// The most samples of a response that are computed.
 const MOST_SAMPLES: usize = 20_000;
-/// A constant fault leaves no trace if the steady mean of the residuals is at most this part of their largest mean or,
-/// with other faults decoupled, of their steady mean before these were decoupled.
+/// Largest steady mean of the residuals that counts as no trace of a constant fault, relative to the largest mean or,
+/// if other faults are decoupled, to the steady mean without this decoupling.
 const NO_TRACE: f64 = 1e-6;
 
 /// A filter of residuals.
@@ -25,7 +25,7 @@ pub(super) struct Decoupling<'a> {
     pub(super) filter: DetectionFilter,
     /// The number of states of the plant with the random walks.
     states: usize,
-    /// Each decoupled input, and whether it is decoupled exactly.
+    /// Position of each decoupled input, and whether the input is decoupled exactly.
     pub(super) inputs: Vec<(usize, bool)>,
 }
 
@@ -73,7 +73,7 @@ impl<'a> Decoupling<'a> {
         self.problem.faults.clone().map(shift).collect()
     }
 
-    /// Returns the filter for `fault`: like this one, but it also decouples each of `others` (exactly, else as a random
+    /// Returns the filter for `fault`: this filter, extended to decouple each of `others` (exactly, else as a random
     /// walk) unless that leaves no trace of `fault`. `shift`: the norm of the steady mean of `fault` in this filter.
     pub(super) fn isolating(
         &self,

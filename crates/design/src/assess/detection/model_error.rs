@@ -21,13 +21,13 @@ use plant_file::PlantFile;
 use plant_file::detection::ModelError;
 use plant_file::signals::Signal;
 
-/// A plant, and the bounds of its inputs.
+/// A linearised plant, and the largest deviation of each of its inputs from the operating point.
 type Case = Rc<(UncertainPlant, DVector<f64>)>;
 
 /// A bound of the means of residuals that errors of the model cause.
 #[derive(Clone, Copy)]
 pub(super) struct LargestMean {
-    /// As a norm in standard deviations, times the stated factor, [`ModelError::margin`].
+    /// Norm of the largest mean in standard deviations, times the stated factor, [`ModelError::margin`].
     pub(super) mean: f64,
     /// For parameters of an FMU: relative excess of the largest mean in the interior over that at the corners.
     pub(super) interior_excess: Option<f64>,
@@ -37,14 +37,13 @@ pub(super) struct LargestMean {
 pub(super) struct ModelErrors<'a> {
     file: &'a PlantFile<'a>,
     request: &'a ModelError,
-    /// The plant and the members of its family, whose entries may deviate by their tolerances.
+    /// The plant and the members of its family, with the tolerances of the entries unless `parameters` is stated.
     plants: Vec<UncertainPlant>,
-    /// The FMU whose parameters deviate, if there is one; the entries are then exact.
+    /// The FMU with the parameters that deviate, if there is one; all entries of `plants` are then exact.
     parameters: Option<&'a ParameterFamily<'a>>,
-    /// The random cases of the parameters, as deviations from -1 to 1.
+    /// The random cases: deviations of the parameters, from -1 to 1.
     random: Vec<Vec<f64>>,
-    /// The plants that were linearised, by the bits of the deviations of their parameters: all tests need the same
-    /// plants.
+    /// Cache of the linearised plants by the bits of the parameter deviations, because all tests need the same plants.
     cases: RefCell<HashMap<Vec<u64>, Case>>,
     /// The values of the measurements at the operating point.
     measured: DVector<f64>,
@@ -140,9 +139,9 @@ impl<'a> ModelErrors<'a> {
         Ok(case)
     }
 
-    /// Returns the linearised FMU with other parameters, and the bounds of its inputs. It is not at rest at the
-    /// operating point of the plant file: an additional input, always 1, stands for the rates of its states and the
-    /// changes of its measurements there.
+    /// Returns the linearised FMU with other parameters, and the bounds of its inputs. This plant is not at rest at the
+    /// operating point of the plant file: an additional input, always 1, stands for the rates of the states and the
+    /// changes of the measurements at this point.
     fn with_parameters(
         &self,
         family: &ParameterFamily<'_>,

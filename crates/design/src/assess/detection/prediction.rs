@@ -4,7 +4,7 @@ use control::Error;
 use control::detection::{Cusum, Delay, WindowTest};
 use nalgebra::DMatrix;
 
-/// The most samples over which a delay is computed, beyond those in which the mean settles.
+/// Largest number of samples over which a detection delay is computed, after the mean has settled.
 const MOST_SAMPLES: usize = 20_000;
 /// The probability with which the least fault is detected in time.
 const POWER: f64 = 0.95;

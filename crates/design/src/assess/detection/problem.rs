@@ -11,7 +11,7 @@ use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::detection::DetectionRequest;
 
-/// A filter counts as fast enough if it has this part of the required decay rate.
+/// Part of the required decay rate with which a filter counts as fast enough.
 const NEARLY: f64 = 0.99;
 
 /// The plant of the residuals, in the time domain of the controller.
@@ -23,7 +23,7 @@ pub(super) struct Problem {
     /// The sizes of the inputs; None for a disturbance without a bound.
     pub(super) sizes: Vec<Option<f64>>,
     disturbances: usize,
-    /// The faults, as positions from 0.
+    /// The positions of the faults in `inputs`, counted from 0.
     pub(super) faults: std::ops::Range<usize>,
     /// The units of the faults.
     pub(super) units: Vec<Option<String>>,
@@ -144,8 +144,8 @@ impl Problem {
     }
 
     /// Returns the least factor of `unit`, 0 or a power of 4, with which the filter without unknown inputs is as fast
-    /// as the loop; if it never is, the least factor with which it is nearly as fast as with any factor. None if no
-    /// factor gives a filter.
+    /// as the loop; if no factor suffices, the least factor with which it is nearly as fast as with any factor. None if
+    /// no factor gives a filter.
     fn least_factor(&self, unit: &DMatrix<f64>) -> Option<f64> {
         let decay = |factor: f64| {
             let plant = NoisyPlant { w: unit * factor, ..self.plant.clone() };

@@ -10,7 +10,7 @@ use crate::plant::linear::LinearPlant;
 use crate::report::robustness::{ToleranceProof, ToleranceResult};
 use plant_file::robustness::RobustnessLimits;
 
-/// The largest multiple of the tolerances that is examined, as for the worst case.
+/// Largest multiple of the tolerances that the proof examines, as for the worst case.
 const MOST: f64 = 16.0;
 /// Part of the time for certificates and bounds that the proof may take.
 const PART: f64 = 0.25;

@@ -10,20 +10,20 @@ use nalgebra::DMatrix;
 use crate::init::log::fit::{SHORT, estimation, relative_errors};
 use crate::init::log::read::Log;
 
-/// The numbers of earlier samples, from which the next one is predicted, that are tried.
+/// Numbers of earlier samples to try, from which the next sample is predicted.
 const PASTS: [usize; 5] = [5, 10, 20, 40, 80];
 /// The largest number of columns of the compressed samples, which bounds the computing time; the first of [`PASTS`] may
 /// have more.
 const COLUMNS: usize = 250;
-/// The largest order that is tried unless it is stated.
+/// Largest order to try unless the order is stated.
 const ORDERS: usize = 10;
-/// The smallest order is chosen whose sum of the logarithms of the errors is at most this above the least one.
+/// Largest excess of the chosen order, the smallest possible, over the least sum of the logarithms of the errors.
 const MARGIN: f64 = 0.2;
-/// D is assumed if it lowers the sum of the logarithms of the errors by more than this.
+/// Least decrease of the sum of the logarithms of the errors for which a direct term D is assumed.
 const FEEDTHROUGH: f64 = 1.0;
 /// Errors below this part of the variance are rounding.
 const ROUNDING: f64 = 1e-12;
-/// The number of blocks, each of which is left out once.
+/// Number of blocks of the log; each is left out once to estimate the tolerance.
 const BLOCKS: usize = 10;
 /// The smallest tolerance that is stated.
 const SMALLEST: f64 = 1e-3;
@@ -41,7 +41,7 @@ pub(super) struct Estimate {
     period: f64,
 }
 
-/// What an estimate assumes.
+/// Structure of the model that an estimate assumes.
 #[derive(Clone, Copy)]
 struct Assumption {
     past: usize,
@@ -70,7 +70,7 @@ impl Estimate {
         Ok(Self { windows, model, continuous, rates, past, feedthrough, period })
     }
 
-    /// Returns the tolerance of the entries, from estimates each of which leaves out one block, or why there is none.
+    /// Returns the tolerance of the entries from estimates without one block each; an error says why there is none.
     pub(super) fn tolerance(&self, logs: &[Log]) -> Result<f64, String> {
         let sentence = |error: control::Error| error.to_string();
         let blocks = blocks(logs, self.past).map_err(sentence)?;
@@ -226,8 +226,8 @@ fn candidates(
 
 /// Returns the sum of the logarithms of the errors over a short, a middle and the longest horizon.
 ///
-/// An error of 1 is that of the mean as a prediction; larger ones count as 1, because an unstable plant cannot be
-/// predicted over a long horizon.
+/// Predicting the mean has the error 1; larger errors count as 1, because an unstable plant cannot be predicted over a
+/// long horizon.
 fn score(logs: &[Log], model: &IdentifiedModel) -> Result<f64, control::Error> {
     let mut score = 0.0;
     for horizon in [SHORT / 4, SHORT, usize::MAX] {

@@ -17,9 +17,9 @@ const GROWTH: f64 = 1.0;
 /// A variance below this part of the mean square of the samples is rounding.
 const ROUNDING: f64 = 1e-15;
 
-/// The fit of one measurement, 100 % for predictions without error, 0 for those as good as the mean.
+/// The fit of one measurement, 100 % for predictions without error, 0 for predictions as good as the mean.
 pub(super) struct Fit {
-    /// The fit of a simulation, which has the inputs only; None if its errors grow.
+    /// The fit of a simulation, which uses the inputs only; None if the errors of the simulation grow.
     pub(super) simulated: Option<f64>,
     /// The fit of predictions [`SHORT`] samples ahead.
     pub(super) predicted: f64,

@@ -12,7 +12,7 @@ use crate::init::labelled::named;
 use crate::init::log::{LogOptions, rounded};
 use plant_file::signals::{Signal, is_one_unit};
 
-/// The largest deviation of a time from its place in the grid, as a part of the sample time.
+/// The largest deviation of a time stamp from the equidistant grid, as a part of the sample time.
 const JITTER: f64 = 0.2;
 
 /// A log of commands and measurements at equidistant instants.
@@ -122,7 +122,7 @@ impl Log {
     }
 }
 
-/// The columns of a log, of which one is the time.
+/// The columns of a log, including the column of the time.
 struct Columns<'a>(&'a Table);
 
 impl Columns<'_> {
@@ -186,7 +186,7 @@ impl Columns<'_> {
         self.all().map(|position| self.name(position).name).collect::<Vec<_>>().join(", ")
     }
 
-    /// Returns the columns whose name is this letter, alone or with a number.
+    /// Returns the columns whose name is `letter`, alone or followed by a number.
     fn numbered(&self, letter: &str) -> Vec<usize> {
         let is_numbered = |position: &usize| {
             let name = self.name(*position).name;

@@ -234,12 +234,12 @@ fn sentence(report: &NormReport) -> String {
     format!("Norm {norm:.4e}{plain}; Frobenius norm of the gain {gain:.4e}. {bound}{fits}")
 }
 
-/// What "least" means: with a region the inequalities are sufficient, not necessary.
+/// Meaning of "least" for constant weights: with a region the inequalities are sufficient, not necessary.
 const LEAST: &str = "Least certified: the inequalities are solved 5 % above the least bound that one \
                      Lyapunov matrix proves for norm and region together; a gain with a smaller norm in \
                      this region may exist.";
 
-/// What "least" means for weights over frequency.
+/// Meaning of "least" for weights over frequency.
 const LOCAL: &str = "Least found: from gains by linear matrix inequalities and by the Kalman filter on, the \
                      norm was lowered over the entries of the gain to a local minimum; a gain with a \
                      smaller norm in this region may exist.";

@@ -1,10 +1,10 @@
-//! The largest value of a function of parameters within their limits: corners and interior.
+//! Searches the largest value of a function of parameters within their limits, at corners and in the interior.
 
 use std::cell::RefCell;
 
 /// Up to this number of parameters, all corners are tried.
 const ALL_CORNERS: usize = 6;
-/// With more parameters, each in turn goes to its worse limit, in at most this number of rounds.
+/// With more than [`ALL_CORNERS`] parameters: largest number of rounds, in which each moves to its worse limit.
 const ROUNDS: usize = 10;
 /// The steps of the search around the largest value, as parts of the distance from the centre to a limit.
 const STEPS: [f64; 4] = [0.5, 0.25, 0.125, 0.0625];
