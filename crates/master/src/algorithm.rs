@@ -46,7 +46,7 @@ choice! {
     /// The order in which the slaves step within a communication step.
     Method {
         /// All slaves step with the values at the start of the step. Slaves without states
-        /// ([`crate::Slave::is_function`]) step last, with the values at its end.
+        /// ([`crate::Slave::is_function`]) step last, with the values at the end of the step.
         Jacobi = "jacobi",
         /// The slaves step one after the other, in the order of their direct dependencies. A slave
         /// uses the values that earlier slaves have reached at the end of the step.
@@ -58,32 +58,30 @@ choice! {
     /// How an input varies within a communication step: a polynomial through known values of its
     /// source (Kuebler and Schiehlen 2000, "Two methods of simulator coupling").
     ///
-    /// A slave without input derivatives (`canInterpolateInputs` is false) gets a constant input.
-    /// For `linear` and `quadratic` this is the mean of the polynomial over the step, which is of
-    /// order 2 (of order 1 if an output of the slave depends directly on the input). For `limited`
-    /// it is the value at the end of the step if the source has already stepped, otherwise the
-    /// value at the start; this is of order 1.
+    /// A slave without input derivatives (`canInterpolateInputs` is false) gets a constant input. For `linear` and
+    /// `quadratic` this constant is the mean of the polynomial over the step, which is of order 2 (of order 1 if an
+    /// output of the slave depends directly on the input). For `limited` the constant is the value at the end of the
+    /// step if the source has already stepped, otherwise the value at the start; this is of order 1.
     Extrapolation {
-        /// Constant: the value at the start of the step, or at its end if the source has already
-        /// stepped.
+        /// Constant: the value at the start of the step, or at the end of the step if the source has already stepped.
         Hold = "hold",
         /// A line. If the source has already stepped, the line interpolates; otherwise it
         /// extrapolates with the output derivative or the last difference quotient of the source,
         /// whichever is smaller, or with slope 0 if their signs differ (minmod limiter; P. L. Roe,
         /// Annu. Rev. Fluid Mech. 18, 1986).
         Limited = "limited",
-        /// A line. If the source has already stepped, the line interpolates; otherwise it extrapolates
-        /// with the output derivative of the source if it provides one, otherwise with its last
-        /// difference quotient.
+        /// A line. If the source has already stepped, the line interpolates; otherwise it extrapolates with the output
+        /// derivative of the source if the source provides one, otherwise with the last difference quotient of the
+        /// source.
         Linear = "linear",
-        /// A parabola through the output derivatives if the source provides them, otherwise through past
-        /// values. If the source has already stepped, the parabola ends at the value that it has reached.
+        /// A parabola through the output derivatives if the source provides them, otherwise through past values. If the
+        /// source has already stepped, the parabola ends at the value that the source has reached.
         Quadratic = "quadratic",
     }
 }
 
 choice! {
-    /// How a step is repeated until outputs and inputs agree at its end.
+    /// How a step is repeated until outputs and inputs agree at the end of the step.
     Coupling {
         /// The step is made once: explicit (weak) coupling.
         Once = "once",
@@ -108,8 +106,8 @@ choice! {
         /// error estimate), and repeated with a smaller size if the difference is too large. Needs
         /// FMU states.
         Doubling = "doubling",
-        /// The error estimate is the error of the input extrapolation at the end of the step; the
-        /// step is repeated with a smaller size if it is too large. Needs FMU states.
+        /// The error estimate is the error of the input extrapolation at the end of the step; a step with a too large
+        /// error is repeated with a smaller size. Needs FMU states.
         Embedded = "embedded",
         /// The size of the next step follows from the change of the connected signals in the last
         /// step. Never rejects a step.
@@ -127,7 +125,7 @@ choice! {
 pub enum EventSource {
     /// A Real output whose value is the time in s of the next event of its FMU.
     NextTime(Port),
-    /// A Real output whose zero crossing is an event; it is located by repeating the step.
+    /// A Real output whose zero crossing is an event, which the master locates by repeating the step.
     Crossing(Port),
 }
 
@@ -152,7 +150,7 @@ pub struct Algorithm {
     pub coupling: Coupling,
     /// Choice of the step size.
     pub control: StepControl,
-    /// Communication step H in s; the first one if the step control varies it.
+    /// Communication step H in s; with a variable step size, the first communication step.
     pub step: f64,
     /// For each slave, the number of communication steps in one of its steps; empty: 1 for all.
     pub multiples: Vec<u32>,
@@ -219,7 +217,7 @@ impl Algorithm {
         }
     }
 
-    /// Checks that the FMUs of `system` support the algorithm and that its settings are consistent.
+    /// Checks that the FMUs of `system` support the algorithm and that the algorithm's settings are consistent.
     ///
     /// # Errors
     ///

@@ -23,8 +23,8 @@ pub(crate) fn build_exchange(system: &mut System, algorithm: &Algorithm) -> Exch
     Exchange::new(system, algorithm, &refusing)
 }
 
-/// Whether an FMU refuses derivatives that `flag` promises. Ignores other failures: they appear again
-/// when the derivatives are needed.
+/// Whether an FMU refuses derivatives that `flag` promises. Ignores other failures, which appear again when the
+/// derivatives are needed.
 fn is_refused(name: &str, done: Result<(), CallError>, flag: &str, what: &str) -> bool {
     let Err(error) = done else { return false };
     let refused = error.leaves_the_instance_usable();
@@ -37,8 +37,8 @@ fn is_refused(name: &str, done: Result<(), CallError>, flag: &str, what: &str) -
     refused
 }
 
-/// Returns `algorithm`. Removes its iteration if an FMU cannot restore its state although its description
-/// promises it, provided that a fallback is allowed and nothing else repeats steps.
+/// Returns `algorithm`. Removes its iteration if an FMU cannot restore its state although the FMU's description
+/// promises this, provided that a fallback is allowed and nothing else repeats steps.
 pub(crate) fn confirm_rollback(system: &mut System, algorithm: &Algorithm) -> Algorithm {
     let once = Algorithm { coupling: Coupling::Once, ..algorithm.clone() };
     if !algorithm.fallback || algorithm.coupling == Coupling::Once || once.repeats() {

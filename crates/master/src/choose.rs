@@ -265,7 +265,7 @@ fn explain_signals(system: &System, discrete: &[Port], reasons: &mut Vec<String>
     }
 }
 
-/// Joins the first names of a list for a message, with the number of the others.
+/// Joins the first names of a list for a message, and adds the number of the remaining names.
 fn shortened<N: Borrow<str>>(names: &[N]) -> String {
     const SHOWN: usize = 8;
     let more = names.len().saturating_sub(SHOWN);

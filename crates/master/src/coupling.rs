@@ -1,5 +1,5 @@
-//! The coupling of a step: a single sweep, or iterated (implicit) coupling, which repeats the sweep
-//! until the input values assumed at its end equal the outputs.
+//! The coupling of a step: a single sweep, or iterated (implicit) coupling: the sweep is repeated until the input
+//! values assumed at the end of the step equal the outputs.
 
 use crate::algorithm::{Algorithm, Coupling};
 use crate::engine::{Engine, SavedState, Swept};
@@ -38,8 +38,8 @@ pub(crate) struct Coupler {
     pub(crate) iterated: Option<Iterated>,
 }
 
-/// Iterated coupling: solves `u = G(u)`. u are the connected values assumed at the end of a step, G(u) those
-/// that the slaves compute there if their inputs end at u.
+/// Iterated coupling: solves `u = G(u)`. u are the connected values assumed at the end of a step, G(u) the values that
+/// the slaves compute at this end from inputs that end at u.
 pub(crate) struct Iterated {
     pub(crate) iteration: Iteration,
     /// Connected values that the slaves assume at the end of the step.
@@ -56,15 +56,15 @@ pub(crate) struct Iterated {
     /// Whether a step whose iteration fails is made once without iteration.
     falls_back: bool,
     pub(crate) fallbacks: Fallbacks,
-    /// Start in s of the communication step in which the iteration failed last; NaN if there is none, and after a
+    /// Start in s of the communication step in which the iteration failed last; NaN without such a step, and after a
     /// return to an earlier state.
     pub(crate) failed_at: f64,
 }
 
-/// Count of the communication steps in which the iteration failed, so that a step was made once without iteration.
+/// Count of the communication steps that were made once without iteration, because the iteration failed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fallbacks {
-    /// Number of these steps. A step that step control or an event repeats counts once.
+    /// Number of communication steps whose iteration failed. A step that step control or an event repeats counts once.
     pub count: u64,
     /// Reason and time of the first failure; empty if there is none.
     pub first: String,
@@ -180,8 +180,8 @@ impl Iterated {
         swept
     }
 
-    /// Computes the Jacobian `dG/du` from the directional derivatives at the end of the step. It
-    /// contains direct dependencies only.
+    /// Computes the Jacobian `dG/du` from the directional derivatives at the end of the step. This matrix contains
+    /// direct dependencies only.
     fn derive(&mut self, engine: &mut Engine, time: f64) -> Result<(), SystemError> {
         for column in 0..self.u.len() {
             self.column.fill(0.0);
@@ -236,7 +236,7 @@ impl Fallbacks {
     }
 }
 
-/// Whether the slaves can restore their states after this error.
+/// Whether the slaves can restore their states after `error`.
 fn is_recoverable(error: &SystemError) -> bool {
     match error {
         SystemError::Coupling { .. } | SystemError::NotFinite { .. } => true,

@@ -115,7 +115,7 @@ impl Drive {
         reached(time, *start).then(|| signal.at(time, &mut self.cursor))
     }
 
-    /// Returns the faults with their memory in `saved`; `None` if faults differ that had begun when it was saved.
+    /// Returns the faults with their memory in `saved`; `None` if the faults that had begun by then differ.
     pub(crate) fn resumed_faults(&self, saved: &DriveState) -> Option<FaultChain> {
         let time = saved.committed.unwrap_or(f64::NEG_INFINITY);
         let mut faults = self.faults.clone().unwrap_or_default();
@@ -168,7 +168,7 @@ impl Drive {
     }
 }
 
-/// The signal that a variable follows, and the time at which it starts to follow it.
+/// The signal that a variable follows, and the start time before which the variable keeps its start value.
 #[derive(Clone, Debug)]
 pub struct DriveSource {
     /// The signal.
@@ -246,8 +246,9 @@ impl Drives {
         self.all.is_empty()
     }
 
-    /// Sets every driven variable but clocks at `time` in s, before the step that starts there: its value and,
-    /// if the FMU takes it, its derivative. Skips values that the FMU already holds, and drives that have not started.
+    /// Sets every driven variable but clocks at `time` in s, before the step that starts there: the value and, if the
+    /// FMU takes derivatives, the derivative. Skips values that the FMU already holds, and drives that have not
+    /// started.
     ///
     /// # Errors
     ///
@@ -257,7 +258,7 @@ impl Drives {
     }
 
     /// Makes driven clocks of `slave` tick, in event mode: those whose signal starts with a value other than 0, or has
-    /// jumped to one between the last commit and `time`, in s.
+    /// jumped to such a value between the last commit and `time`, in s.
     pub(crate) fn tick(
         &mut self,
         system: &mut System,
@@ -396,7 +397,7 @@ impl Drives {
         })
     }
 
-    /// Returns the state of all drives for a checkpoint, in their order.
+    /// Returns the states of all drives for a checkpoint, in the order of the drives.
     #[must_use]
     pub fn state(&self) -> Vec<DriveState> {
         let state = |drive: &Drive| DriveState {

@@ -1,5 +1,5 @@
-//! The engine: the slaves with their connections and driven variables. It makes sweeps, in which
-//! every slave makes one step, and saves and restores the state of all slaves and connections.
+//! The engine: the slaves with their connections and driven variables. The engine makes sweeps, in which every slave
+//! makes one step, and saves and restores the state of all slaves and connections.
 
 mod groups;
 mod instants;
@@ -24,7 +24,7 @@ use threads::{Threads, run};
 
 /// Largest number of partial steps in which a slave may complete a step.
 const PARTS: u32 = 1000;
-/// Smallest part of a step that is made before or after an event within it.
+/// Smallest step before or after an event within a communication step, as a fraction of this communication step.
 const DIVISION: f64 = 1e-6;
 
 /// Advice for an FMU that fails after `fmi2Discard`.
@@ -37,16 +37,16 @@ pub(crate) struct Engine {
     pub(crate) drives: Drives,
     pub(crate) grid: Grid,
     pub(crate) instants: Instants,
-    /// Why steps end only at the grid points `start + k H`; `None` if they may end at any time.
+    /// Why steps end only at the grid points `start + k H`; `None` if steps may end at any time.
     rigid: Option<Rigid>,
     division: Division,
-    /// Whether steps may be repeated; every slave can then restore its state. Otherwise a slave
-    /// that completes only a part of its step (`fmi2Discard`) continues until the end.
+    /// Whether steps may be repeated, for which every slave must be able to restore its state. Otherwise a slave that
+    /// completes only a part of its step (`fmi2Discard`) continues until the end.
     pub(crate) repeats: bool,
     groups: Groups,
     /// For each slave, the number of communication steps in one of its steps.
     multiples: Vec<u32>,
-    /// For each slave, the size in s of its step in the current sweep; 0 if it makes none.
+    /// For each slave, the size in s of its step in the current sweep; 0 for a slave that makes no step.
     sizes: Vec<f64>,
     /// Whether some slaves step in the background.
     background: bool,
@@ -62,7 +62,7 @@ enum Division {
     Never,
     /// The step ends at the change.
     AtChanges,
-    /// The step is made as planned; the first change is reported, because it takes effect late.
+    /// The step is made as planned; a warning reports the first change, which takes effect late.
     Report,
 }
 
@@ -345,7 +345,7 @@ impl Engine {
         }
     }
 
-    /// Returns the step of `slave` from `time`; its size is 0 if it makes none.
+    /// Returns the step of `slave` from `time`; the size of the step is 0 if the slave makes none.
     fn step_of(&self, slave: usize, time: f64) -> CommunicationStep {
         CommunicationStep { time, size: self.sizes[slave], never_back: !self.repeats }
     }
@@ -380,8 +380,7 @@ impl Engine {
         failure.map_or(Ok(()), |(_, error)| Err(error))
     }
 
-    /// Starts the steps of background slaves up to the first failure; returns its position and
-    /// error.
+    /// Starts the steps of background slaves up to the first failure; returns the position and error of this failure.
     fn start_members(&mut self, members: Range<usize>, time: f64) -> Option<(usize, SystemError)> {
         for position in members {
             let slave = self.groups.sequence[position];

@@ -85,9 +85,9 @@ pub enum SystemError {
         relative: String,
         /// The unit of the end that is a difference.
         relative_unit: String,
-        /// The other end of the connection.
+        /// The end of the connection that is no difference.
         absolute: String,
-        /// The unit of the other end.
+        /// The unit of the end that is no difference.
         absolute_unit: String,
     },
     /// The two ends of a connection have different sizes.
@@ -114,7 +114,7 @@ pub enum SystemError {
         from: String,
         /// The second terminal, as `slave.terminal`.
         to: String,
-        /// What does not match.
+        /// The difference between the terminals, as part of a sentence.
         why: String,
     },
     /// A structural parameter has removed an element of an array that is connected or set.
@@ -187,7 +187,7 @@ pub enum SystemError {
     /// An FMI call failed.
     #[error("{slave} at t = {} s: {source}", seconds(*time))]
     Call {
-        /// The slave, or a variable of it.
+        /// The slave, or one of its variables.
         slave: String,
         /// Time of the master in s.
         time: f64,
@@ -224,7 +224,7 @@ pub enum SystemError {
         slave: String,
         /// The capability flag that is false.
         lacks: &'static str,
-        /// The function of the master that needs it.
+        /// The function of the master that needs the capability.
         required_by: String,
     },
     /// The initial values of an algebraic loop cannot be found.
@@ -287,7 +287,7 @@ pub enum SystemError {
     TooManySteps {
         /// Number of steps in the observed interval.
         steps: u32,
-        /// Total length of these steps in s.
+        /// Total length in s of the steps of this interval.
         length: f64,
         /// Smallest step in s.
         smallest: f64,

@@ -12,9 +12,9 @@ use solve::Bracket;
 
 /// Slot of the FMU states from which a step is repeated to locate a crossing.
 const SLOT: usize = 2;
-/// Width to which a crossing is located, as a fraction of the step.
+/// Accuracy with which the time of a crossing is located, as a fraction of the step.
 const WIDTH: f64 = 1e-9;
-/// An event that is less than this fraction of the step after its start is at the start.
+/// Distance from the start of the step, as a fraction of the step, below which an event counts as at the start.
 const LEAST: f64 = 1e-9;
 
 /// The event sources, and the state from which a crossing is located.
@@ -44,7 +44,7 @@ impl Events {
         (!sources.is_empty()).then_some(events)
     }
 
-    /// Makes the planned step, or a shorter one that ends at the first event within it or where the step
+    /// Makes the planned step, or a shorter step that ends at the first event within the planned one or where the step
     /// control ends it.
     pub(crate) fn step(
         &mut self,

@@ -40,7 +40,7 @@ pub(crate) use tasks::Task;
 /// All connections of a system with the current values of their outputs.
 pub(crate) struct Exchange {
     pub(crate) reals: Reals,
-    /// The connections whose values are held during a step; their inputs are set before it.
+    /// The connections whose values are held during a step; their inputs are set before the step.
     held: Channels,
     /// The connections to discrete and clocked inputs of slaves whose events the master handles. These inputs are
     /// set in event mode only.
@@ -92,7 +92,7 @@ impl Exchange {
 
     /// Puts faults on connections; each fault is given with the input of its connection. Returns an error, and changes
     /// no fault, if an input has no connection, if it is a String, a binary or a clock that ticks in event mode, or if
-    /// two chains are given with it.
+    /// an input occurs twice.
     pub(crate) fn set_faults(
         &mut self,
         system: &System,
@@ -295,8 +295,8 @@ impl Exchange {
         self.check_finite(system, position, time)
     }
 
-    /// Checks that every connected Real output of the slave is finite; warns once for each output whose
-    /// derivative is not.
+    /// Checks that every connected Real output of the slave is finite; warns once for each output whose derivative is
+    /// not finite.
     #[inline]
     pub(crate) fn check_finite(
         &mut self,

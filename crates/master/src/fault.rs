@@ -66,10 +66,10 @@ pub enum Fault {
     Quantisation {
         /// Distance of two levels, above 0.
         step: f64,
-        /// One of the levels.
+        /// A level; the other levels are whole multiples of `step` away.
         offset: f64,
     },
-    /// `v`, limited to these bounds.
+    /// `v`, limited to `lowest` and `highest`.
     Saturation {
         /// Lower bound; `None`: minus infinity.
         lowest: Option<f64>,
@@ -247,8 +247,8 @@ impl FaultChain {
         self.stages.iter().filter_map(|stage| stage.next_break(after)).reduce(f64::min)
     }
 
-    /// Takes over the memory of the faults that `saved`, the chain of the same input at `time` in s, has too; the other
-    /// faults have no memory. Returns false, and changes nothing, if a fault of only one chain has begun by then.
+    /// Takes over the memory of the faults that are also in `saved`, the chain of the same input at `time` in s; others
+    /// have no memory. Returns false, and changes nothing, if a fault of only one chain has begun by then.
     pub(crate) fn resume(&mut self, saved: &Self, time: f64) -> bool {
         let begun = |stages: &[Stage]| stages.iter().any(|stage| stage.has_begun(time));
         let (mut resumed, mut rest) = (self.stages.clone(), saved.stages.as_slice());
@@ -270,8 +270,8 @@ impl FaultChain {
         true
     }
 
-    /// Takes over the memory of the faults of `earlier`; returns false, and changes nothing, if they are
-    /// not the first faults of this chain.
+    /// Takes over the memory of the faults of `earlier`; returns false, and changes nothing, if the faults of `earlier`
+    /// are not the first faults of this chain.
     pub(crate) fn inherit(&mut self, earlier: &Self) -> bool {
         let Some(first) = self.stages.get_mut(..earlier.stages.len()) else { return false };
         let same =

@@ -9,8 +9,8 @@ use crate::system::System;
 use fmu_description::number::seconds;
 use slave::{Slave, time_rounding};
 
-/// A rest of the run that is less than this fraction of the step, or within the rounding of the stop time, gets no step
-/// of its own.
+/// Remaining time of the run, as a fraction of the step, below which no further step is made; so is a remainder within
+/// the rounding of the stop time.
 const ROUNDING: f64 = 1e-6;
 
 /// The grid of communication points `start + k step` of a run, and the time reached.
@@ -154,8 +154,8 @@ impl Grid {
         (ROUNDING * size).max(time_rounding(self.start.abs().max(time.abs()), 0.0))
     }
 
-    /// Returns `end`, or the stop time if it is earlier or so close that the rest of a step of
-    /// `size` s would be rounding.
+    /// Returns `end`, or the stop time if this is earlier or so close that the rest of a step of `size` s would be
+    /// rounding.
     fn limited(&self, end: f64, size: f64) -> f64 {
         match self.stop {
             Some(stop) if end > stop - self.negligible(size, stop) => stop,
@@ -168,8 +168,8 @@ impl Grid {
         self.limited(self.time + size, size)
     }
 
-    /// Returns the grid point `t_start + number H`, in s; 0 if it is 0 up to the rounding of the product, because no
-    /// other time is equal to 0 s up to rounding.
+    /// Returns the grid point `t_start + number H`, in s; exactly 0 if the sum is 0 up to rounding, because comparisons
+    /// of times treat no other number as equal to 0 s.
     #[inline]
     #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
     fn point(&self, number: u64) -> f64 {
@@ -228,8 +228,8 @@ impl Grid {
         (self.count, self.points) = (count, (self.point(count), self.point(count + 1)));
     }
 
-    /// Resumes at `time` after `count` grid points. The end of the first run may have been counted as
-    /// a grid point although it is not on the grid.
+    /// Resumes at `time` after `count` grid points. The end of the first run may have been counted as a grid point
+    /// without being on the grid.
     pub(crate) fn resume(&mut self, time: f64, count: u64) {
         self.set_count(count);
         if count > 0 && self.points.0 > time + self.negligible(self.step, time) {

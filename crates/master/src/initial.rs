@@ -22,9 +22,9 @@ const TOLERANCE: f64 = 1e-10;
 /// values.
 const EVALUATIONS: u32 = 100;
 
-/// Initialises all slaves: settings, initialization mode, values of connections, end of
-/// initialization mode. Settings follow `fmi2SetupExperiment`, because some FMUs reset them in this
-/// call. With `allow_nan` a loop may have values that are not finite.
+/// Initialises all slaves: settings, initialization mode, values of connections, end of initialization mode. Settings
+/// follow `fmi2SetupExperiment`, because some FMUs reset settings in this call. With `allow_nan` a loop may have values
+/// that are not finite.
 pub(crate) fn initialise(
     system: &mut System,
     experiment: &Experiment,
@@ -96,8 +96,7 @@ struct Iterate<'a> {
 struct Graph<'a> {
     faults: HashMap<Port, &'a FaultChain>,
     outputs: Vec<Port>,
-    /// For each output, the numbers of its connections: the positions in [`System::connections`], then those in
-    /// `System::initial`.
+    /// For each output, the indices of its connections in [`System::connections`] followed by `System::initial`.
     connections: Vec<Vec<usize>>,
     components: Components,
     /// Whether the values of a loop need not be finite.

@@ -8,7 +8,7 @@ use fmu_description::{IntegerType, Kind, ModelDescription, RealType, ScalarVaria
 use crate::system::{Port, System};
 use slave::{Transformation, Value};
 
-/// [`Limits::rounding`] of a floating-point type, unless its own precision is coarser.
+/// Default of [`Limits::rounding`] for a floating-point type; a type with a coarser precision has a larger value.
 const ROUNDING: f64 = 1e-9;
 /// Largest number of variables and of items that a warning names, and of connected inputs that are reported.
 const NAMED: usize = 5;
@@ -21,7 +21,7 @@ struct Limits {
     min: f64,
     max: f64,
     nominal: f64,
-    /// Part of the limit, or of the nominal value if this is larger, by which a value may exceed the limit.
+    /// Tolerated excess over a limit, relative to the larger one of limit and nominal value.
     rounding: f64,
     /// The items of an enumeration; empty for another type.
     items: Vec<(String, i64)>,
@@ -71,7 +71,7 @@ impl Limits {
         Some(Self { min, max, nominal: nominal.unwrap_or(1.0).abs(), rounding, items })
     }
 
-    /// Returns the reason why `value` is not allowed; `None` if it is allowed.
+    /// Returns the reason why `value` is not allowed; `None` if `value` is allowed.
     fn refuse(&self, value: f64) -> Option<String> {
         let rounding = |limit: f64| self.rounding * self.nominal.max(limit.abs());
         let is_item =
@@ -201,7 +201,7 @@ impl Watch {
         self.watched.is_empty()
     }
 
-    /// Warns once about each input that gets a value that it does not allow at the communication point `time`, in s.
+    /// Warns once about each input that gets a value outside its limits at the communication point `time`, in s.
     /// `reals` are the connected Reals; `integer` returns the value of an Integer output.
     pub(crate) fn check(
         &mut self,

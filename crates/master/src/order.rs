@@ -90,7 +90,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Returns the entry of the output at position `output` in the first of `lists` that has one. An alias of FMI 3.0
-    /// has no entry; the entry of its [`System::holder`] is returned instead. `None` if it is no output.
+    /// has no entry; the entry of its [`System::holder`] is returned instead. `None` if the variable is no output.
     fn entry(&self, lists: &[&HashMap<u32, &'a Unknown>], output: usize) -> Option<&'a Unknown> {
         let entry = |position: usize| {
             let index = u32::try_from(position + 1).ok()?;
@@ -111,13 +111,13 @@ impl<'a> Rows<'a> {
     }
 
     /// Returns the positions of the variables on which the output at position `output` depends directly, with
-    /// [`System::holder`] for an alias; `None`: possibly all, or it is no output.
+    /// [`System::holder`] for an alias; `None`: possibly all, or the variable is no output.
     pub(crate) fn direct_dependencies(&self, output: usize) -> Option<HashSet<usize>> {
         self.dependencies(self.entry(&[&self.outputs], output)?)
     }
 
     /// Returns the positions of the variables on which the output at position `output` depends in initialization mode,
-    /// with [`System::holder`] for an alias; `None`: possibly all, or it is no output.
+    /// with [`System::holder`] for an alias; `None`: possibly all, or the variable is no output.
     pub(crate) fn initial_dependencies(&self, output: usize) -> Option<HashSet<usize>> {
         self.dependencies(self.entry(&[&self.initial, &self.outputs], output)?)
     }

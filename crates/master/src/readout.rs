@@ -26,7 +26,7 @@ pub struct Readout {
     /// For each clocked variable, in the order of the variables, whether one of its clocks has ticked since the last
     /// communication point, so that the variable has a value now.
     pub present: Vec<bool>,
-    /// The clocks of these variables.
+    /// The clocks of the clocked variables.
     clocks: Vec<ClockRead>,
     /// The inputs whose values are known without a call of an FMU, with the positions of the values.
     known: Vec<(Port, usize)>,

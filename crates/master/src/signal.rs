@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Relative difference below which two times are equal; as in FMPy (Python's `math.isclose`).
 const SAME: f64 = 1e-9;
-/// Largest difference in s of two equal times, for times in seconds since 1970, of which 1e-9 is more than 1 s.
+/// Largest difference in s of equal times: [`SAME`] alone would allow more than 1 s for times in seconds since 1970.
 const MOST: f64 = 1e-6;
 
 /// Returns the largest difference in s of a time that is equal to `time` up to rounding.
@@ -55,12 +55,12 @@ impl Sample {
     }
 }
 
-/// The position of the last look-up in a [`Track`]. It makes the next look-up nearby fast and does
-/// not change any result; time may go back.
+/// The position of the last look-up in a [`Track`]. The position makes a nearby look-up fast and changes no result;
+/// time may go back.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cursor(usize);
 
-/// A function of time. At a jump, the value is the one after the jump.
+/// A function of time. The value at a jump is the value after the jump.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Signal {
@@ -133,8 +133,8 @@ impl Signal {
         }
     }
 
-    /// Returns the first time after `after`, both in s, at which the signal jumps, or has a kink at
-    /// which a step should end. The points of a sampled signal count only if it jumps there.
+    /// Returns the first time after `after`, both in s, at which the signal jumps, or has a kink at which a step should
+    /// end. The points of a sampled signal count only where the signal jumps.
     #[must_use]
     pub fn next_break(&self, after: f64) -> Option<f64> {
         match self {
@@ -145,7 +145,7 @@ impl Signal {
         }
     }
 
-    /// Returns the signal `scale s(t) + shift`; between the points of [`Interpolation::Points`] it is still 0.
+    /// Returns the signal `scale s(t) + shift`; between the points of [`Interpolation::Points`] its value stays 0.
     #[must_use]
     pub fn scaled(self, scale: f64, shift: f64) -> Self {
         let absolute = |value: f64| scale * value + shift;

@@ -45,7 +45,7 @@ impl SignalType {
 }
 
 impl System {
-    /// Returns the type of the variable at `port` by its description; a continuous one that the user names is discrete.
+    /// Returns the type of the variable at `port` by its description; the user may declare a continuous one discrete.
     #[must_use]
     pub fn signal_type(&self, port: Port) -> SignalType {
         match SignalType::of(self.variable(port)) {

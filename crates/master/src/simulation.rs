@@ -34,7 +34,7 @@ pub struct Simulation {
     coupler: Coupler,
     control: SizeControl,
     events: Option<Events>,
-    /// The check of the step sizes, if they vary.
+    /// The check that variable steps do not become too small to reach the stop time.
     pace: Option<Pace>,
     order: Order,
     early_end: Option<EarlyEnd>,
@@ -219,9 +219,9 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// Returns an error if an FMU fails or does not complete the step, if an output or input is not
-    /// finite, if the iteration or the step control fails, or if events do not settle. Some slaves may
-    /// then be at the start of the step and others at its end.
+    /// Returns an error if an FMU fails or does not complete the step, if an output or input is not finite, if the
+    /// iteration or the step control fails, or if events do not settle. Some slaves may then be at the start of the
+    /// step and others at the end.
     pub fn step(&mut self) -> Result<(), SystemError> {
         if self.is_finished() {
             return Ok(());

@@ -22,7 +22,7 @@ pub struct SlowValues {
 #[derive(Debug)]
 struct SlowSlave {
     slave: usize,
-    /// The values at the start of its step.
+    /// The values at the start of the slave's step.
     start_values: Readout,
     places: Vec<ValueIndex>,
 }

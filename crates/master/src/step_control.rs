@@ -42,12 +42,12 @@ pub(crate) struct SizeControl {
     states: Vec<Bond>,
     /// State and time at the start of a step that may be repeated.
     start: SavedState,
-    /// The connected values after one whole step, to compare them with those after two halves.
+    /// The connected values after one whole step, for comparison with the values after two half steps.
     whole: Vec<f64>,
 }
 
-/// The step to make next: its end and its size in s. The size is not always their exact difference;
-/// see [`size_between`].
+/// The step to make next: its end and its size in s. The size may differ from end minus start by rounding; see
+/// [`size_between`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlannedStep {
     pub(crate) end: f64,
@@ -155,8 +155,8 @@ impl SizeControl {
         varies.then_some(time + size)
     }
 
-    /// Makes the planned step. If steps may be repeated, makes a shorter one where slaves do not complete
-    /// it or where its error is above the tolerance.
+    /// Makes the planned step. If steps may be repeated, makes a shorter step if slaves do not complete the planned one
+    /// or if its error is above the tolerance.
     #[inline]
     pub(crate) fn step(
         &mut self,
@@ -340,7 +340,7 @@ impl SizeControl {
     }
 }
 
-/// Repeats the step from `time` in s and the state `start` up to the end of the run that a slave has requested in it.
+/// Repeats the step from `time` in s and the state `start` up to the end of the run that a slave requested in it.
 pub(crate) fn step_to_ending(
     engine: &mut Engine,
     coupler: &mut Coupler,
@@ -371,7 +371,7 @@ const MOST_REMAINING_STEPS: f64 = 1e7;
 pub(crate) struct Pace {
     /// The smallest step in s.
     smallest: f64,
-    /// Number of steps since the last check, with their total length in s.
+    /// Number of steps since the last check of the pace.
     steps: u32,
     length: f64,
 }

@@ -19,12 +19,12 @@ const MOST: usize = 1000;
 /// The slaves whose events the master handles.
 #[derive(Debug, Default)]
 pub(crate) struct Instants {
-    /// The positions of the slaves whose events the master handles.
+    /// The positions of these slaves in [`System::slaves`], ascending.
     members: Vec<usize>,
-    /// For each slave, the time in s of its next known event; infinite if there is none, and for a slave without
+    /// For each slave, the time in s of its next known event; infinite without a known event, and for a slave without
     /// connections.
     next: Vec<f64>,
-    /// For each slave, the time in s of the event at which its last step ended; infinite if it ended at none.
+    /// For each slave, the time in s of the event at which its last step ended; infinite if the step ended at no event.
     pub(crate) pending: Vec<f64>,
     /// For each slave, whether it has connections.
     connected: Vec<bool>,
@@ -274,7 +274,7 @@ impl Instants {
     }
 
     /// Records that the step of `slave` has ended at an event. `time`, in s, is a little before this end, because the
-    /// communication point may be less than it by rounding.
+    /// communication point may be earlier than the end by rounding.
     pub(crate) fn record_event(&mut self, slave: usize, time: f64) {
         self.pending[slave] = time;
     }

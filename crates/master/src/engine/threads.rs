@@ -12,7 +12,7 @@ use pool::Pool;
 
 /// Number of steps measured with and without threads.
 const TRIALS: u32 = 16;
-/// Threads are used if their time is below this fraction of the time without threads.
+/// Time of a step in threads, relative to the time without threads, below which threads are used.
 const WORTH: f64 = 0.9;
 
 /// The thread pool, and the measured times of each group of slaves.
@@ -35,7 +35,7 @@ struct Measured {
 /// How a group makes one step.
 pub(super) struct Trial {
     pub(super) in_threads: bool,
-    /// Start of the step while it is measured.
+    /// Start of the step if its time is measured.
     start: Option<Instant>,
 }
 
@@ -51,8 +51,8 @@ impl Threads {
         Ok(Some(Self { pool, groups: vec![Measured::default(); groups] }))
     }
 
-    /// Decides how the group makes its next step: the first trials without threads, the following
-    /// with them, then with them if they were clearly faster.
+    /// Decides how the group makes its next step: the first trials without threads, the next trials in threads, later
+    /// steps in threads if these were clearly faster.
     pub(super) fn begin(&self, group: usize) -> Trial {
         let Measured { steps, sequential, parallel } = self.groups[group];
         if steps < 2 * TRIALS {

@@ -92,7 +92,7 @@ impl Channels {
     }
 
     /// Records the undisturbed values in the faults at the final communication point `time`. Slaves for which `ahead`
-    /// is true, because their step ends later, contribute the value at its start.
+    /// is true, because their step ends later, contribute the value at the start of this step.
     pub(super) fn commit(&mut self, time: f64, ahead: &dyn Fn(usize) -> bool) {
         all!(self.commit(time, ahead););
     }
@@ -108,7 +108,7 @@ impl Channels {
     }
 
     /// Computes the inputs of `slave` at `time`. Slaves for which `ahead` is true, because their step ends later,
-    /// contribute the value at its start.
+    /// contribute the value at the start of this step.
     pub(super) fn gather(&mut self, slave: usize, time: f64, ahead: &dyn Fn(usize) -> bool) {
         all!(self.gather(slave, time, ahead););
     }

@@ -106,9 +106,9 @@ struct PortMap {
 struct Wiring {
     port_maps: Vec<PortMap>,
     output_ports: Vec<Port>,
-    /// For each input, the index of its output.
+    /// For each input, the index of the connected output.
     sources: Vec<usize>,
-    /// For each input, the transformation of the connection.
+    /// For each input, the transformation (factor and offset) of its connection.
     transformations: Vec<Transformation>,
     input_ports: Vec<Port>,
     faults: Vec<Option<FaultChain>>,
@@ -209,7 +209,7 @@ impl<T: Clone + Default> Channel<T> {
         Self { access, wiring, state, values: defaults(inputs) }
     }
 
-    /// Returns the current value of a connected output; `None` if it is not connected here.
+    /// Returns the current value of a connected output; `None` if no connection of this channel starts at the output.
     pub(crate) fn value(&self, port: Port) -> Option<&T> {
         let key = |known: &Port| (known.slave, known.variable);
         let position = self.wiring.output_ports.binary_search_by_key(&key(&port), key);
@@ -222,8 +222,8 @@ impl<T: Clone + Default> Channel<T> {
         index.map(|k| self.wiring.faults[k] = Some(fault.clone())).is_some()
     }
 
-    /// Records the undisturbed values in the faults at the final communication point `time`. Slaves
-    /// for which `ahead` is true, because their step ends later, contribute the value at its start.
+    /// Records the undisturbed values in the faults at the final communication point `time`. Slaves for which `ahead`
+    /// is true, because their step ends later, contribute the value at the start of this step.
     pub(crate) fn commit(&mut self, time: f64, ahead: &dyn Fn(usize) -> bool) {
         for k in 0..self.wiring.faults.len() {
             if self.wiring.faults[k].is_some() {
@@ -250,8 +250,8 @@ impl<T: Clone + Default> Channel<T> {
         inputs.filter_map(|(port, fault)| Some((*port, fault.as_ref()?)))
     }
 
-    /// Computes the inputs of `slave` for a step from `time`. Slaves for which `ahead` is true, because
-    /// their step ends later, contribute the value at its start.
+    /// Computes the inputs of `slave` for a step from `time`. Slaves for which `ahead` is true, because their step ends
+    /// later, contribute the value at the start of this step.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, ahead: &dyn Fn(usize) -> bool) {
         for k in self.wiring.port_maps[slave].input_range.clone() {
             let source = self.state.source(&self.wiring, k, ahead);

@@ -11,8 +11,8 @@ pub(super) struct Polynomial {
     pub(super) curvature: f64,
 }
 
-/// Known values of an output: at the start of its last step and of the two steps before, and at the
-/// end of the last step; with derivatives at the start if the FMU provides them.
+/// Known values of an output: at the start of its last step and of the two steps before, and at the end of the last
+/// step. Derivatives at the start, if the FMU provides them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OutputHistory {
     pub(super) earlier: f64,
@@ -106,8 +106,8 @@ impl OutputHistory {
         }
     }
 
-    /// Returns the polynomial over a step whose end values are known. A signal that jumps is constant,
-    /// because it takes no values between those before and after the jump.
+    /// Returns the polynomial over a step whose end values are known. A signal that jumps is constant, because no
+    /// values between the values before and after the jump occur.
     pub(super) fn interpolated(&self, extrapolation: Extrapolation) -> Polynomial {
         let slope = (self.end - self.start) / self.size;
         match extrapolation {

@@ -19,7 +19,7 @@ pub(super) struct Ticks {
 struct TickSource {
     slave: usize,
     references: Vec<u32>,
-    /// For each clock, whether it ticks: not 0.
+    /// For each clock, nonzero if the clock ticks.
     flags: Vec<i32>,
 }
 
@@ -28,9 +28,9 @@ struct TickSource {
 struct TickTarget {
     port: Port,
     reference: u32,
-    /// The index of its [`TickSource`].
+    /// The index of the [`TickSource`] from which ticks arrive.
     source: usize,
-    /// The index of the output clock in its [`TickSource`].
+    /// The index of the output clock in this [`TickSource`].
     clock: usize,
     /// Whether the input clock has received the present tick.
     received: bool,
@@ -142,7 +142,8 @@ impl Exchange {
         })
     }
 
-    /// Sets the continuous inputs of `slave` to their values at `time` if one has changed; returns whether one has.
+    /// Sets the continuous inputs of `slave` to their values at `time`, unless all are unchanged; returns whether it
+    /// set them.
     pub(crate) fn set_reals_in_event(
         &mut self,
         system: &mut System,
@@ -190,8 +191,8 @@ impl Reals {
         instance.get_real(&port_map.outputs, &mut self.trace.latest[port_map.output_range.clone()])
     }
 
-    /// Sets the inputs of a slave to their values at `time` if one has changed: it differs from the value set last, or
-    /// has a derivative. Returns whether one has.
+    /// Sets the inputs of a slave to their values at `time` if a value differs from the value set last or has a
+    /// derivative. Returns whether it has set them.
     fn set_now(
         &mut self,
         slave: usize,

@@ -71,26 +71,26 @@ impl PortMap {
 #[derive(Debug, Default)]
 pub(super) struct Layout {
     pub(super) port_maps: Vec<PortMap>,
-    /// For each input, the index of its output.
+    /// For each input, the index of the connected output.
     pub(super) sources: Vec<u32>,
     /// For each input, factor and offset of the transformation of its connection.
     pub(super) factors: Vec<f64>,
     pub(super) offsets: Vec<f64>,
     /// For each input, whether it is constant within a step, because an end of its connection is not continuous.
     pub(super) held: Vec<bool>,
-    /// For each input, its port.
+    /// For each input, its slave and variable.
     pub(super) input_ports: Vec<Port>,
-    /// For each slave, whether it has no states, so that it uses input values at the end of a step.
+    /// For each slave, whether it has no states and therefore uses input values at the end of a step.
     pub(super) functions: Vec<bool>,
     /// For each slave, whether all its inputs are copies of outputs, without transformation.
     pub(super) plain: Vec<bool>,
-    /// For each output, its port.
+    /// For each output, its slave and variable.
     pub(super) output_ports: Vec<Port>,
-    /// For each output, its slave.
+    /// For each output, the index of its slave.
     pub(super) owners: Vec<u32>,
-    /// For each output, the index of its first derivative, if its slave provides it.
+    /// For each output, the index of its first derivative, if the slave provides one.
     pub(super) slopes: Vec<Option<u32>>,
-    /// For each output, the index of its second derivative, if its slave provides it.
+    /// For each output, the index of its second derivative, if the slave provides one.
     pub(super) curvatures: Vec<Option<u32>>,
     /// For each output, whether it is continuous but jumps with a discrete output of another slave.
     pub(super) jumping: Vec<bool>,
@@ -205,9 +205,9 @@ impl Layout {
         }
     }
 
-    /// Finds the outputs that jump with a discrete output of another slave: they depend directly on a Real input that
-    /// is connected to it, also through further slaves. An output counts as smooth if its dependencies are not stated,
-    /// or if it depends on discrete outputs only through inputs of other types, such as a Boolean.
+    /// Finds the outputs that jump with a discrete output of another slave: outputs that depend directly, also through
+    /// further slaves, on a Real input connected to the discrete output. An output counts as smooth if its dependencies
+    /// are not stated, or if it depends on discrete outputs only through inputs of other types, such as a Boolean.
     fn find_jumping(&mut self, system: &System) {
         let outputs = || self.output_ports.iter().zip(&self.discrete);
         let discrete = outputs().filter(|(_, is_discrete)| **is_discrete);
@@ -258,7 +258,7 @@ impl Layout {
         }
     }
 
-    /// Returns the index of an output; `None` if it is not connected to a Real.
+    /// Returns the index of an output; `None` if the output is not connected to a Real.
     pub(super) fn output(&self, port: Port) -> Option<usize> {
         self.indices.get(&port).map(|&index| index as usize)
     }

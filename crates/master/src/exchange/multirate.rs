@@ -3,7 +3,7 @@
 use super::reals::Reals;
 use slave::time_rounding;
 
-/// Two times are equal if they differ by less than this fraction of the step, or by [`time_rounding`].
+/// Two times count as equal if they differ by less than this fraction of the step, or by [`time_rounding`].
 const ROUNDING: f64 = 1e-6;
 
 impl Reals {

@@ -17,7 +17,7 @@ pub(super) struct Pass {
     ranges: Vec<PortRanges>,
     /// Value references of the inputs.
     inputs: Vec<u32>,
-    /// For each input, the index of its output.
+    /// For each input, the index of the connected output.
     sources: Vec<u32>,
     /// The value of each input.
     values: Vec<f64>,

@@ -224,8 +224,8 @@ impl Reals {
             || (self.trace.spans[source].stepped && self.uses_end_value(slave, source, end))
     }
 
-    /// Returns the known values of an output over the last step of its slave, `span`. The value at its end is the
-    /// assumed one during an iteration, unless the slave has stepped in a Gauss-Seidel sweep.
+    /// Returns the known values of an output over the last step of its slave, `span`. During an iteration the value at
+    /// the end is the assumed value, unless the slave has stepped in a Gauss-Seidel sweep.
     pub(super) fn history(&self, output: usize, span: &Span) -> OutputHistory {
         let (layout, trace) = (&self.layout, &self.trace);
         let derivative = |place: Option<u32>| place.map(|k| trace.start_derivatives[k as usize]);

@@ -6,14 +6,12 @@ use crate::exchange::Reals;
 use crate::system::System;
 use slave::{CallError, Slave};
 
-/// Number of passes: they carry first derivatives through two slaves and second derivatives through
-/// one.
+/// Number of passes: three passes carry first derivatives through two slaves and second derivatives through one.
 const PASSES: usize = 3;
 
 impl Exchange {
-    /// Computes the derivatives of all outputs at the start time, before a first step of `size` s,
-    /// including outputs that depend directly on inputs. Each pass carries them through one more
-    /// slave.
+    /// Computes the derivatives of all outputs at the start time, before a first step of `size` s, including outputs
+    /// that depend directly on inputs. Each pass carries derivatives through one more slave.
     pub(crate) fn derive_at_start(
         &mut self,
         system: &mut System,
@@ -36,8 +34,8 @@ impl Exchange {
 }
 
 impl Reals {
-    /// Tests whether a slave supports derivatives: reads them for its connected outputs and sets
-    /// derivatives of 0 at its connected inputs. Returns the results for outputs and for inputs.
+    /// Tests whether a slave supports derivatives: reads derivatives of its connected outputs and sets derivatives of 0
+    /// at its connected inputs. Returns the results for outputs and for inputs.
     pub(crate) fn try_derivatives(
         &self,
         slave: usize,

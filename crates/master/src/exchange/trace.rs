@@ -9,7 +9,7 @@ pub(super) struct Span {
     pub(super) start: f64,
     /// Size of the last step in s.
     pub(super) size: f64,
-    /// Size of the step before it in s.
+    /// Size in s of the step before the last step.
     pub(super) last_size: f64,
     /// Size of the step before that in s.
     pub(super) earlier_size: f64,
@@ -17,7 +17,7 @@ pub(super) struct Span {
     pub(super) stepped: bool,
 }
 
-/// Size in s of a missing step; difference quotients over it are 0.
+/// Size in s of a step that was never made; difference quotients over this size are 0.
 const NEVER: f64 = f64::MAX;
 
 impl Default for Span {

@@ -72,8 +72,8 @@ impl DelayLine {
         self.points.clear();
     }
 
-    /// Adds a point and removes the points that are no longer needed. Replaces the last point if it is
-    /// not earlier than `time`, or if the points would be too close.
+    /// Adds a point and removes the points that are no longer needed. Replaces the last point if this point is not
+    /// earlier than `time`, or if the points would be too close.
     pub(super) fn push(&mut self, time: f64, value: f64) {
         let count = self.points.len();
         let repeated = self.points.back().is_some_and(|&(last, _)| last >= time);

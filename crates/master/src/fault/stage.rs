@@ -12,7 +12,7 @@ use crate::signal::{Sample, earliest, reached};
 pub(super) struct Stage {
     window: Window,
     fault: Fault,
-    /// The value of a stuck fault, or the last value that a dropout has not lost (the first if it lost all).
+    /// The value of a stuck fault, or the last value that a dropout has not lost (the first value if all were lost).
     #[serde(rename = "kept")]
     last: Option<f64>,
     /// The memory of a delay.
@@ -28,12 +28,12 @@ impl Stage {
         Ok(Self { window, fault, last: None, line })
     }
 
-    /// Whether both are the same fault in the same window; their memories may differ.
+    /// Whether `self` and `other` are the same fault in the same window; their memories may differ.
     pub(super) fn is_same_fault(&self, other: &Self) -> bool {
         self.window == other.window && self.fault == other.fault
     }
 
-    /// Whether the fault has started by `time` in s; a delay starts earlier by its length, when it records values.
+    /// Whether the fault has started by `time` in s. A delay starts earlier by its length, to record values.
     pub(super) fn has_begun(&self, time: f64) -> bool {
         let past = if let Fault::Delay { seconds, .. } = self.fault { seconds } else { 0.0 };
         reached(time, self.window.from - past)

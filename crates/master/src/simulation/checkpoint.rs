@@ -27,7 +27,7 @@ const FIRST_SLOT: usize = 3;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint {
     origin: Origin,
-    /// The names of the connections and driven variables, in their order.
+    /// Names of connections, then of driven variables, to compare a resumed system with the saved one.
     parts: Vec<String>,
     master: MasterState,
     /// Faults on connections, each with the input of its connection.
@@ -45,14 +45,14 @@ struct MasterState {
     attempted: f64,
     /// Number of grid points passed.
     count: u64,
-    /// Size of the next step in s, if the step control chooses it.
+    /// Size in s of the next step, chosen by the step control.
     size: f64,
     controller: Controller,
     iteration: Option<Iteration>,
     values: Values,
     /// Values of inputs that were set last by [`System::set_value`].
     inputs: Vec<(Port, Value)>,
-    /// For each slave, the time in s of the event at which its last step ended; infinite if it ended at none.
+    /// For each slave, the time in s of the event at which its last step ended; infinite if the step ended at no event.
     pending: Vec<f64>,
     ended: Option<Ending>,
 }
@@ -211,7 +211,8 @@ impl Simulation {
         self.restore_master(&checkpoint.master, scenario)
     }
 
-    /// Restores everything but the FMU states; `scenario` has its memory at the time of `state`.
+    /// Restores everything but the FMU states; `scenario` contains the memory of faults and drives at the time of
+    /// `state`.
     fn restore_master(
         &mut self,
         state: &MasterState,

@@ -113,7 +113,7 @@ impl System {
         Err(wrong(format!("the type that its transformation is for: {transformation:?}")))
     }
 
-    /// Returns the name of the type of a variable in the version of its FMU.
+    /// Returns the name of the type of a variable in the FMI version of its FMU.
     pub(crate) fn type_name(&self, port: Port) -> &'static str {
         let description = self.slaves[port.slave].1.description();
         self.variable(port).kind.element_in(description.version())

@@ -14,7 +14,7 @@ use slave::{CallError, Value};
 #[derive(Clone, Debug)]
 pub(crate) struct Setting {
     pub(crate) port: Port,
-    /// As the variable holds it.
+    /// The value in the variable's type.
     pub(crate) value: Value,
     /// The value as the user wrote it.
     text: String,
@@ -116,8 +116,8 @@ impl System {
     }
 
     /// Reads the settings back after the initialization, except inputs and the variables whose holders are in
-    /// `replaced`, which have received another value. Returns an error if a parameter has another value than the one
-    /// set or, with `time` in s, if an FMU cannot be used any more.
+    /// `replaced`, which have received another value. Returns an error if a parameter differs from the value set or,
+    /// with `time` in s, if an FMU cannot be used any more.
     pub(crate) fn confirm_settings(
         &mut self,
         replaced: &HashSet<Port>,

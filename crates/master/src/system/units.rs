@@ -8,7 +8,7 @@ use crate::error::SystemError;
 use slave::Transformation;
 
 impl System {
-    /// Returns name and base of a variable's unit, if it has one that its description defines.
+    /// Returns name and base of a variable's unit, if the variable has a unit that its description defines.
     fn unit(&self, port: Port) -> Option<(&String, Option<BaseUnit>)> {
         let real = self.variable(port).kind.as_real()?;
         let name = real.unit.as_ref()?;
@@ -17,7 +17,7 @@ impl System {
         Some((name, base))
     }
 
-    /// Returns the name of the unit of a variable; `None` if it has none or is dimensionless.
+    /// Returns the name of the unit of a variable; `None` for a variable without a unit or with a dimensionless one.
     pub(super) fn unit_name(&self, port: Port) -> Option<&str> {
         let real = self.variable(port).kind.as_real()?;
         real.unit.as_deref().filter(|unit| !["", "1", "-"].contains(unit))
