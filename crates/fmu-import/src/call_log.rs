@@ -16,7 +16,7 @@ use slave::{CallError, Events, ModelExchange, Slave, StepResult};
 
 /// A log file of FMI calls.
 ///
-/// Each call is written before its execution and its status afterwards, unbuffered: after a crash the
+/// Each call is written before its execution, the status of the call afterwards, both unbuffered: after a crash the
 /// last line names the function that crashed.
 #[derive(Clone, Debug)]
 pub struct CallLog {
@@ -120,7 +120,7 @@ pub struct LoggedSlave<S: Slave + ?Sized = dyn Slave> {
     log: CallLog,
     instance: String,
     slave: Box<S>,
-    /// Whether the slave logs its C calls itself.
+    /// Whether the slave logs its C calls itself, so that this wrapper need not.
     logs_itself: bool,
     version: Version,
 }
@@ -150,7 +150,7 @@ const NAMES: &[(&str, &str, &str)] = &[
     ("fmi2EnterInitializationMode", "fmi3EnterInitializationMode", "fmiInitializeSlave"),
 ];
 
-/// Functions of FMI 2.0, each with its name in FMI 1.0 for model exchange if that differs from [`NAMES`].
+/// Functions of FMI 2.0, each with its name in FMI 1.0 for model exchange if this name differs from [`NAMES`].
 const MODEL_EXCHANGE_NAMES: &[(&str, &str)] = &[
     ("fmi2Terminate", "fmiTerminate"),
     ("fmi2FreeInstance", "fmiFreeModelInstance"),

@@ -37,12 +37,12 @@ pub enum CompileError {
     /// The FMU cannot be read or written, or has no source code.
     #[error(transparent)]
     Package(Box<PackageError>),
-    /// The FMU does not state how its library is built, or states it wrongly.
+    /// The FMU states no way, or an invalid way, to build its library.
     #[error("{}: {reason}", path.display())]
     Description {
         /// The FMU.
         path: PathBuf,
-        /// What is missing or wrong.
+        /// The missing or invalid part of the description.
         reason: String,
     },
     /// None of the compilers that were tried runs.
@@ -126,7 +126,7 @@ pub fn compile(path: &Path) -> Result<PathBuf, CompileError> {
     Ok(target)
 }
 
-/// Returns the model identifiers of an FMU, which are the names of its libraries.
+/// Returns the model identifiers of an FMU, the names of its libraries.
 fn identifiers(description: &ModelDescription) -> Vec<String> {
     let simulation = description.stepped().map(|flags| flags.model_identifier);
     let exchange = description.model_exchange.as_ref().map(|flags| flags.model_identifier.clone());
@@ -173,7 +173,7 @@ fn content(unpacked: &Unpacked) -> Result<Package, CompileError> {
 
 /// A compiler.
 struct Compiler {
-    /// The program and its arguments.
+    /// The program of the compiler and the program's arguments.
     words: Vec<OsString>,
     /// The output of `--version`.
     version: String,
@@ -230,7 +230,7 @@ fn absolute(mut words: Vec<OsString>) -> Vec<OsString> {
     words
 }
 
-/// Splits a command at its white space. Its words may be any bytes.
+/// Splits a command at its white space. The words may contain any bytes.
 #[cfg(unix)]
 fn words(command: &OsStr) -> Vec<OsString> {
     use std::os::unix::ffi::OsStrExt as _;
@@ -244,7 +244,7 @@ fn words(command: &OsStr) -> Vec<OsString> {
     command.to_string_lossy().split_whitespace().map(OsString::from).collect()
 }
 
-/// What is needed to build the libraries of an FMU.
+/// The data for building the libraries of an FMU.
 struct Build<'a> {
     path: &'a Path,
     sources: PathBuf,
@@ -274,7 +274,7 @@ impl<'a> Build<'a> {
         })
     }
 
-    /// Returns a hash of the content of the FMU and of the compilers: the name of its folder in the cache.
+    /// Returns a hash of the content of the FMU and of the compilers: the name of the FMU's folder in the cache.
     fn key(&self, identifiers: &[String]) -> Result<String, CompileError> {
         let mut hasher = DefaultHasher::new();
         (RECIPE, std::env::consts::ARCH, std::env::consts::OS).hash(&mut hasher);

@@ -30,7 +30,7 @@ pub(crate) use signals::{ENDING_SIGNALS, handle, ignores_hangup};
 #[cfg(unix)]
 pub use signals::{end_copy, leave_file, on_ending_signal};
 
-/// How long the program's crash function may take.
+/// Time limit for the program's crash function.
 const REPORT_LIMIT: Duration = Duration::from_secs(5);
 
 /// Whether the end of the process has started.
@@ -47,8 +47,8 @@ static STATUS: AtomicI32 = AtomicI32::new(0);
 static WAITED: AtomicU64 = AtomicU64::new(0);
 /// The address of the slot that the crashed thread entered last.
 static PLACE: AtomicUsize = AtomicUsize::new(0);
-/// The name in reports of an activity that is no function of the standard. The dynamic linker is locked while it
-/// lasts: no other thread can start or register destructors of thread-local data.
+/// The name in reports of an activity that is no function of the standard. The dynamic linker is locked during this
+/// activity: no other thread can start or register destructors of thread-local data.
 pub(crate) const LOADING: &str = "loading the library";
 /// Like [`LOADING`].
 pub(crate) const UNLOADING: &str = "unloading the library";
@@ -56,7 +56,7 @@ pub(crate) const UNLOADING: &str = "unloading the library";
 /// The thread that runs the program's crash function.
 static REPORTER: OnceLock<Thread> = OnceLock::new();
 
-/// The last failure, for the case that the process crashes before the program reports it.
+/// The last failure of a call, for the report of a crash that precedes the program's own report of this failure.
 static LAST_FAILURE: Mutex<Option<String>> = Mutex::new(None);
 
 /// Records a failure that the program is about to report, so that a crash report includes it: an FMU that crashes
@@ -77,7 +77,7 @@ pub struct Call {
     pub function: &'static str,
     /// Time of the instance in s.
     pub time: f64,
-    /// The number of the call, which distinguishes it from others of the same function at the same time.
+    /// Number of the call within its instance, to distinguish calls of the same function at the same time.
     number: u64,
 }
 
@@ -90,9 +90,9 @@ pub enum Cause {
     Exit(Option<i32>),
     /// A call of [`give_up`], with the time since the ending signal, if there was one.
     GivenUp(Option<Duration>),
-    /// The library of an FMU was not unloaded within its time limit.
+    /// Unloading the library of an FMU took longer than its time limit.
     Overdue,
-    /// A function of an FMU did not return: an exception, `pthread_exit` or a cancellation left it.
+    /// A function of an FMU did not return: an exception, `pthread_exit` or a cancellation ended the function.
     Unwound,
 }
 
@@ -101,7 +101,7 @@ pub enum Cause {
 pub struct Ending {
     /// The cause.
     pub cause: Cause,
-    /// The call that caused the end; if it is unknown, all calls that had not returned.
+    /// The call that caused the end; if unknown, all calls that had not returned.
     pub calls: Vec<Call>,
     /// The last failure that [`note`] recorded before the end, a possible reason.
     pub before: Option<String>,
@@ -306,7 +306,7 @@ pub(crate) fn be_supervised(supervisor: i32) {
     SUPERVISOR.store(supervisor, Ordering::Relaxed);
 }
 
-/// Sends the supervisor the signal for which it waits, if it is still the parent of this process.
+/// Sends the awaited signal to the supervisor, if the supervisor is still the parent of this process.
 #[cfg(target_os = "linux")]
 fn wake_supervisor() {
     use rustix::process::{Signal, getppid, kill_process};

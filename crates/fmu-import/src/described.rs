@@ -34,14 +34,14 @@ pub enum DescriptionError {
         version: Version,
         /// Name of the model for the user.
         name: String,
-        /// The warnings and the broken rules, each with its section.
+        /// The warnings and the broken rules, each with its section of the standard.
         problems: Vec<String>,
     },
 }
 
 /// Returns the model description that the library at `file` generates, as XML and as data: of FMI 3.0 if `version` is
 /// [`Version::V3`], otherwise of FMI 2.0. The crate `fmu` must have exported the library. `resources` is the folder of
-/// its resources; messages use `name`.
+/// the library's resources; messages use `name`.
 ///
 /// # Errors
 ///

@@ -21,7 +21,7 @@ pub enum LoadError {
         path: PathBuf,
         /// The message of the operating system's loader.
         message: String,
-        /// How to solve the problem; empty if unknown.
+        /// Advice for solving the problem; empty if unknown.
         hint: String,
     },
     /// The library lacks a required function.
@@ -32,14 +32,14 @@ pub enum LoadError {
         /// The function.
         function: String,
     },
-    /// The library states another version of FMI than its model description, or none.
+    /// The library states another version of FMI than the model description, or no version.
     #[error("{path}: {function} gives {actual:?}, expected {expected:?}")]
     Version {
         /// The library.
         path: PathBuf,
         /// The function that returned the version, such as `fmi2GetVersion`.
         function: &'static str,
-        /// The version that it returned.
+        /// The version that the library returned.
         actual: String,
         /// The version of the model description.
         expected: &'static str,
@@ -61,7 +61,7 @@ pub enum LoadError {
     Unsupported {
         /// `modelName`.
         model: String,
-        /// What the importer does not offer.
+        /// The feature that the importer does not offer.
         reason: String,
     },
     /// The library failed to write its model description.

@@ -48,7 +48,7 @@ pub enum FmuError {
     NoInterface {
         /// The FMU.
         path: PathBuf,
-        /// The elements of which one is required.
+        /// The elements of which `modelDescription.xml` must have one.
         expected: &'static str,
     },
     /// The library of an FMU with `needsExecutionTool` does not load or instantiate; the missing tool may be the cause.
@@ -67,14 +67,14 @@ impl From<PackageError> for FmuError {
     }
 }
 
-/// An opened FMU. Its unpacked files are removed when it and all its instances have been dropped.
+/// An opened FMU. The unpacked files are removed after the drop of the FMU and all its instances.
 #[derive(Clone)]
 pub struct Fmu {
     pub(crate) content: Arc<Content>,
 }
 
-/// The reservation of an FMU that allows one instance only (`canBeInstantiatedOnlyOncePerProcess`). After its drop
-/// another instance may follow.
+/// The reservation of an FMU that allows one instance only (`canBeInstantiatedOnlyOncePerProcess`). After the drop of
+/// this reservation another instance may be created.
 pub(crate) struct OnlyInstance(Arc<Content>);
 
 impl Drop for OnlyInstance {
@@ -85,15 +85,15 @@ impl Drop for OnlyInstance {
 
 /// The library and the unpacked files of an FMU.
 ///
-/// Fields are dropped in this order, which unloads the library before its file is removed.
+/// Fields are dropped in the order of their declaration: the library is unloaded before its file is removed.
 pub(crate) struct Content {
     /// The library for co-simulation or scheduled execution; `None` if the FMU offers model exchange only.
     library: Option<AnyLibrary>,
     pub(crate) unpacked: Unpacked,
-    /// The name of its file or folder, for messages.
+    /// The name of the FMU's file or folder, for messages.
     name: String,
     binding: Binding,
-    /// For an FMU that allows one instance only: whether that instance exists.
+    /// Whether the only instance of an FMU that allows one instance only exists.
     instantiated: AtomicBool,
     /// Positions of variables by type and value reference; filled by the first message that refers to a variable.
     names: OnceLock<HashMap<(char, u32), usize>>,
@@ -108,8 +108,8 @@ pub(crate) enum AnyLibrary {
 }
 
 impl Fmu {
-    /// Unpacks the FMU at `path`, reads its description and loads its library for co-simulation or, if the FMU does
-    /// not offer it, for scheduled execution. `path` is an archive or a folder with an unpacked FMU.
+    /// Unpacks the FMU at `path`, reads its description and loads its library for co-simulation or, if the FMU does not
+    /// offer co-simulation, for scheduled execution. `path` is an archive or a folder with an unpacked FMU.
     ///
     /// # Errors
     ///
@@ -137,7 +137,7 @@ impl Fmu {
         Self::load(folder, Unpacked::in_folder(folder)?, Binding::Strict)
     }
 
-    /// Opens an FMU like [`Fmu::open`], but also accepts one that offers model exchange only. The library for model
+    /// Opens an FMU like [`Fmu::open`], but also accepts an FMU that offers model exchange only. The library for model
     /// exchange is loaded with each instance.
     ///
     /// # Errors
@@ -178,9 +178,9 @@ impl Fmu {
         &self.content.unpacked.description
     }
 
-    /// Returns the description whose variables the instances have. It is [`Fmu::description`] with a variable for each
-    /// element of an array at the start values of its structural parameters (FMI 3.0), and with value references of
-    /// their own for negated aliases (FMI 1.0).
+    /// Returns the description whose variables the instances have. This is [`Fmu::description`] with a variable for
+    /// each element of an array at the start values of its structural parameters (FMI 3.0), and a separate value
+    /// reference for each negated alias (FMI 1.0).
     ///
     /// # Errors
     ///
@@ -246,9 +246,9 @@ impl Fmu {
     }
 }
 
-/// Returns the description of an instance without integrator. In FMI 3.0 each element of an array is a scalar
-/// variable, at the values `sizes` of structural parameters; in FMI 1.0 negated aliases have value references of
-/// their own. `None` in FMI 2.0: the description of the FMU. On failure returns the reason.
+/// Returns the description of an instance without integrator. In FMI 3.0 each element of an array is a scalar variable,
+/// at the values `sizes` of structural parameters; in FMI 1.0 each negated alias has a separate value reference. `None`
+/// in FMI 2.0: the description of the FMU. On failure returns the reason.
 pub(crate) fn scalar_description(
     description: &ModelDescription,
     sizes: &HashMap<u32, u64>,
@@ -307,7 +307,7 @@ pub(crate) fn unpack(path: &Path) -> Result<Unpacked, PackageError> {
     if path.is_dir() { Unpacked::in_folder(path) } else { Unpacked::open(path) }
 }
 
-/// Returns the warnings about the archive, then those about the description.
+/// Returns the warnings about the archive, then the warnings about the description.
 pub(crate) fn warnings(unpacked: &Unpacked) -> impl Iterator<Item = String> {
     let description = unpacked.warnings.iter().map(ToString::to_string);
     unpacked.archive_warnings.iter().cloned().chain(description)

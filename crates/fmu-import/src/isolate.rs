@@ -84,16 +84,16 @@ pub struct Options {
     pub logging: bool,
     /// The program that becomes the worker; `None`: this program.
     pub executable: Option<PathBuf>,
-    /// How the worker integrates an instance for model exchange; `None`: co-simulation or scheduled execution.
+    /// Integration of an instance for model exchange by the worker; `None`: co-simulation or scheduled execution.
     pub integration: Option<Integration>,
 }
 
-/// How a worker integrates an instance for model exchange. The worker must have called [`worker_with`].
+/// Integration of a model-exchange instance by a worker. The worker must have called [`worker_with`].
 #[derive(Clone, Debug)]
 pub struct Integration {
-    /// The options, as the [`Integrator`] of the worker reads them.
+    /// The options, in the text form that the [`Integrator`] of the worker reads.
     pub options: String,
-    /// Converts the description of the instance to that of the slave that the integrator makes.
+    /// Converts the description of the model-exchange instance to the description of the integrator's slave.
     pub describe: fn(&ModelDescription) -> ModelDescription,
 }
 
@@ -151,7 +151,7 @@ pub enum IsolateError {
         executable: PathBuf,
         /// The instance.
         instance: String,
-        /// How the process ended or failed.
+        /// The cause of the failure.
         failure: Failure,
     },
     /// This process was started as a worker, but tries to start workers itself.
@@ -234,7 +234,7 @@ impl Package {
         &self.unpacked.description
     }
 
-    /// Returns the warnings about the archive, then those about the description.
+    /// Returns the warnings about the archive, then the warnings about the description.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         warnings(&self.unpacked)
     }
@@ -273,10 +273,10 @@ pub fn open(path: &Path, name: &str, options: &Options) -> Result<Isolated, Isol
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WorkerError {
-    /// No master started the program, or it cannot set up what a worker needs.
+    /// No master started the program, or the worker's memory or connection cannot be set up.
     #[error("{WORKER} is for the master's own use: {what}")]
     Alone {
-        /// What is missing.
+        /// The missing or failed part.
         what: &'static str,
         /// The error of the operating system.
         source: io::Error,
@@ -284,7 +284,7 @@ pub enum WorkerError {
     /// The command in shared memory is invalid.
     #[error("the memory shared with the master is corrupted: found {actual}, expected a command")]
     Corrupted {
-        /// What was found.
+        /// The value found.
         actual: u64,
     },
     /// This operating system does not support isolation.

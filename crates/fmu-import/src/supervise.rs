@@ -1,4 +1,4 @@
-//! Supervision: the program works in a child process; this process waits for its end and reports it.
+//! Supervision: the program works in a child process; this process waits for the child and reports its end.
 //!
 //! [`split`] is for programs, before they start a thread. An FMU can end its process by `_exit`, or install a signal
 //! handler of its own; the supervisor can still name the FMU, its last function and the time.
@@ -21,11 +21,11 @@ use rustix::process::{
 
 use crate::crash::{self, Call, ENDING_SIGNALS, RECORD, ignores_hangup};
 
-/// Time limit for the process to end after its work.
+/// Time limit for the child to end after the work of the program.
 const AFTER_WORK: Duration = Duration::from_secs(1);
-/// How long the process may stay in the same calls of FMUs after an ending signal.
+/// Time after an ending signal for which the child may stay in the same calls of FMUs before it is killed.
 const AFTER_SIGNAL: Duration = Duration::from_secs(8);
-/// Interval between two checks of these limits.
+/// Interval between two checks of these time limits.
 const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Number of 64-bit words that both processes share for the program: 2 MiB, of which the system allocates only the
@@ -34,7 +34,7 @@ const WORDS: usize = 1 << 18;
 /// The words that both processes share.
 static MEMORY: OnceLock<&'static [AtomicU64]> = OnceLock::new();
 
-/// How the process of the program ended.
+/// The end of the process of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// The process exited with this status; -1 if the system does not know it.
@@ -60,7 +60,7 @@ impl fmt::Display for End {
 /// The end of the program's process and its state at this time.
 #[derive(Clone, Debug)]
 pub struct Ended {
-    /// How the process ended.
+    /// Cause of the end.
     pub end: End,
     /// The exit status that the program chose; `None` if the process ended before.
     pub status: Option<u8>,
@@ -202,7 +202,7 @@ struct Watch {
     standstill: Option<Standstill>,
 }
 
-/// The FMU calls that have not returned, and since when they have been the same.
+/// The FMU calls that have not returned, and the time since which this set of calls has not changed.
 struct Standstill {
     since: Instant,
     calls: Vec<Call>,
@@ -239,7 +239,8 @@ impl Watch {
         }
     }
 
-    /// Passes a signal on to the process, unless the terminal has sent it to both. SIGTSTP stops both processes.
+    /// Passes a signal on to the process, unless the terminal has sent it to both processes. SIGTSTP stops both
+    /// processes.
     fn pass_on(&mut self, signal: c_int, by_kernel: bool) {
         match signal {
             libc::SIGCHLD => {}
@@ -279,7 +280,7 @@ impl Watch {
         let _ = kill_process(self.child, signal);
     }
 
-    /// Returns how the process ended; `None` while it runs.
+    /// Returns the cause of the end of the process; `None` while the process runs.
     fn reap(&self) -> Option<End> {
         let Ok(ended) = waitpid(Some(self.child), WaitOptions::NOHANG) else {
             return Some(End::Exited(-1));

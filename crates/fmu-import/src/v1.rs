@@ -23,19 +23,19 @@ pub(crate) struct Instance {
     inputs: HashSet<(ValueType, u32)>,
     /// Value references of the negated aliases in `description`, each with the value reference in the FMU.
     negated: HashMap<u32, u32>,
-    /// The description, in which negated aliases have value references of their own.
+    /// The model description, with a separate value reference for each negated alias.
     description: ModelDescription,
     /// Buffers of the calls.
     references: Vec<u32>,
     reals: Vec<f64>,
     integers: Vec<c_int>,
     booleans: Vec<c_char>,
-    /// For model exchange: the result of `fmiInitialize`, until a value is set or `fmiEventUpdate` is due.
+    /// Result of `fmiInitialize` of a model-exchange FMU, until a value is set or `fmiEventUpdate` is due.
     initialized: Option<EventInfo>,
     interface: Interface,
 }
 
-/// Returns the description that an instance has: negated aliases have value references of their own.
+/// Returns the description of an instance: each negated alias has a separate value reference.
 pub(crate) fn scalar_description(description: &ModelDescription) -> ModelDescription {
     let mut scalars = description.clone();
     separate_negated(&mut scalars);
@@ -139,7 +139,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Returns the description, in which negated aliases have value references of their own.
+    /// Returns the description, with a separate value reference for each negated alias.
     pub(crate) fn description(&self) -> &ModelDescription {
         &self.description
     }
@@ -282,8 +282,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Calls `fmiEventUpdate`. The first call after `fmiInitialize` returns the result of that function instead, unless
-    /// a value has been set since or the FMU needs another iteration.
+    /// Calls `fmiEventUpdate`. The first call after `fmiInitialize` instead returns the result of `fmiInitialize`,
+    /// unless a value has been set since or the FMU needs another iteration.
     pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         match self.initialized.take() {
             Some(info) if !info.discrete_states_need_update => Ok(info),

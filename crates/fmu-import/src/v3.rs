@@ -1,9 +1,8 @@
 //! FMUs of FMI 3.0 as slaves: types, arrays, events, clocks and model partitions.
 //!
-//! In co-simulation the slave uses Event Mode if the FMU has it, and lets the FMU return early. It handles
-//! the events and continues the step, so that the master sees one whole communication step (FMI 3.0.2,
-//! section 4.2), unless the master handles the events. In model exchange the caller handles the events; input clocks
-//! tick in them.
+//! In co-simulation the slave uses Event Mode if the FMU has it, and lets the FMU return early. Unless the master
+//! handles the events, the slave handles them and continues the step, so that the master sees one whole communication
+//! step (FMI 3.0.2, section 4.2). In model exchange the caller handles the events, in which input clocks tick.
 
 mod access;
 mod buffer;
@@ -32,8 +31,8 @@ use plan::Plans;
 use slave::{CallError, Failure};
 use states::State;
 
-/// The categories of messages that explain a status (FMI 3.0.2, section 2.4.5). They are switched on:
-/// with `loggingOn = false` alone an FMU is silent about its errors.
+/// The categories of messages that explain a status (FMI 3.0.2, section 2.4.5). These categories are switched on: with
+/// `loggingOn = false` alone an FMU is silent about its errors.
 const STATUS_CATEGORIES: [&str; 4] =
     ["logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"];
 
@@ -259,7 +258,7 @@ fn unknown(function: &'static str, reference: u32) -> CallError {
 }
 
 /// Returns whether the FMU is in the same mode as before a call that failed: the call was refused, or returned
-/// `fmi3Discard` (FMI 3.0.2, section 2.2.4). After `fmi3Error` it is in state Terminated (section 2.3.1).
+/// `fmi3Discard` (FMI 3.0.2, section 2.2.4). After `fmi3Error` the FMU is in state Terminated (section 2.3.1).
 fn keeps_mode(error: &CallError) -> bool {
     use Failure as F;
     matches!(error.failure, F::InvalidAnswer(_) | F::Missing | F::Status(Status::Discard))

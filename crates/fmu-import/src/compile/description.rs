@@ -10,7 +10,7 @@ use fmu_description::xml::{self, Element};
 /// `BuildConfiguration`: how one library is built.
 pub(super) struct BuildConfiguration {
     pub(super) model_identifier: String,
-    /// The platform tuple for which it is; `None`: all other platforms.
+    /// Platform tuple for which the configuration is; `None`: all platforms without a configuration of their own.
     platform: Option<String>,
     pub(super) sets: Vec<SourceFileSet>,
     /// Names of libraries for the linker: of files in `binaries`, or of libraries of the system.

@@ -20,8 +20,8 @@ const SLOT_COUNT: usize = 4096;
 /// Bytes of an instance's name that reports show.
 const NAME_LENGTH: usize = 96;
 
-/// The record of this process for a report of its end. It is static because an FMU may overwrite the heap before it
-/// crashes.
+/// The record of this process for a report of its end. The record is static because an FMU may overwrite the heap
+/// before it crashes.
 pub(crate) static RECORD: Record = Record {
     slots: [const { Slot::new() }; SLOT_COUNT],
     used: AtomicUsize::new(0),
@@ -30,17 +30,17 @@ pub(crate) static RECORD: Record = Record {
     copies: AtomicUsize::new(0),
 };
 
-/// The calls of all instances, and the progress of the program. It fills whole pages, of at most 64 KiB each, which a
-/// supervisor shares with this process.
+/// The calls of all instances, and the progress of the program. The record fills whole pages, of at most 64 KiB each,
+/// which a supervisor shares with this process.
 #[repr(C, align(65536))]
 pub(crate) struct Record {
-    /// The slots of the instances. Those beyond [`SLOT_COUNT`] share the last slot.
+    /// The slots of the instances. Instances beyond [`SLOT_COUNT`] share the last slot.
     slots: [Slot; SLOT_COUNT],
     /// The number of slots, counted from the first one, that were ever taken.
     used: AtomicUsize,
     /// Whether the first step has started.
     pub(super) started: AtomicBool,
-    /// The exit status with which the program ends, plus 1; 0 while it works.
+    /// The exit status with which the program ends, plus 1; 0 while the program works.
     pub(crate) done: AtomicI32,
     /// The number of copies of this process that FMUs made by `fork` and that continued as the program.
     pub(super) copies: AtomicUsize,
@@ -110,7 +110,7 @@ pub(crate) struct Slot {
     calls: AtomicU64,
     /// Bits of the time of the instance, in s.
     time: AtomicU64,
-    /// Name of the instance; `length` is its number of bytes.
+    /// Name of the instance, the first `length` bytes.
     name: [AtomicU8; NAME_LENGTH],
     length: AtomicUsize,
 }
@@ -239,13 +239,13 @@ impl Drop for Place {
     }
 }
 
-/// Returns the address of the slot that this thread entered last; 0 if it entered none.
+/// Returns the address of the slot that this thread entered last; 0 if the thread entered no slot.
 #[inline]
 pub(crate) fn last_of_this_thread() -> usize {
     LAST.try_with(Cell::get).unwrap_or(0)
 }
 
-/// Returns the names of the instances so far, except of those whose slot a later instance has taken.
+/// Returns the names of the instances so far, except instances whose slot a later instance has taken.
 #[cfg(unix)]
 pub(super) fn instances() -> impl Iterator<Item = Name> {
     RECORD.used().iter().map(Slot::name)

@@ -32,7 +32,7 @@ pub(super) const FATAL: [(c_int, &str); 6] = [
     (libc::SIGABRT, "SIGABRT: abort was called"),
     (libc::SIGSYS, "SIGSYS: an invalid system call"),
 ];
-/// The ending signals, by which users and systems end a program or announce its end.
+/// The ending signals: signals by which users and systems end a program or announce its end.
 pub(crate) const ENDING_SIGNALS: [c_int; 7] = [
     libc::SIGINT,
     libc::SIGTERM,
@@ -53,7 +53,7 @@ thread_local! {
 /// Identifier of the process that called `watch`; processes forked by an FMU are not handled.
 static PROCESS: AtomicU32 = AtomicU32::new(0);
 
-/// In a copy of the process that `fork` has made, the address of the slot that its thread had entered last; otherwise
+/// Address of the slot that the forking thread had entered last, in a copy of the process made by `fork`; otherwise
 /// [`NOT_FORKED`].
 static FORKED_BY: AtomicUsize = AtomicUsize::new(NOT_FORKED);
 const NOT_FORKED: usize = usize::MAX;
@@ -129,7 +129,7 @@ pub(super) fn is_copy() -> bool {
     FORKED_BY.load(Ordering::Relaxed) != NOT_FORKED
 }
 
-/// Ends this process if it is a copy that an FMU made by `fork` and that continues as the program.
+/// Ends this process if it is a copy, made by an FMU with `fork`, that continues as the program.
 #[inline]
 pub fn end_copy() {
     if is_copy() {
@@ -206,7 +206,7 @@ pub(crate) unsafe fn handle(
     check(unsafe { libc::sigaction(signal, &raw const action, null_mut()) })
 }
 
-/// Restores the default action of `signal` and raises it again; its handler calls this function.
+/// Restores the default action of `signal` and raises the signal again, in its handler.
 fn act_as_by_default(signal: c_int) {
     // SAFETY: restores the default; the signal is delivered when the handler returns.
     unsafe {
@@ -344,7 +344,7 @@ pub(super) fn leave(status: c_int) -> ! {
     unsafe { libc::_exit(status) }
 }
 
-/// Handles a call of `exit`. It is reported unless the program has finished its work.
+/// Handles a call of `exit`. The call is reported unless the program has finished its work.
 fn exit_called(status: c_int) {
     if is_done() || is_forked() {
         return;

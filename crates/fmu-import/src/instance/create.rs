@@ -11,15 +11,15 @@ use crate::library::Interface;
 use crate::{v1, v2, v3};
 
 impl Fmu {
-    /// Creates an instance called `name` for co-simulation or, if the FMU does not offer it, for scheduled
+    /// Creates an instance called `name` for co-simulation or, if the FMU does not offer co-simulation, for scheduled
     /// execution.
     ///
     /// # Errors
     ///
     /// [`FmuError::NoInterface`] if the FMU offers neither; [`FmuError::OnlyOnce`] for a forbidden second instance;
     /// [`Instantiate`](crate::LoadError::Instantiate) with the FMU's messages if the FMU does not instantiate, in
-    /// [`FmuError::NeedsTool`] if it declares to need a tool; [`FmuError::Location`] if the path of the unpacked FMU
-    /// cannot be written as a URI (FMI 1.0 and 2.0).
+    /// [`FmuError::NeedsTool`] if the FMU declares to need a tool; [`FmuError::Location`] if the path of the unpacked
+    /// FMU cannot be written as a URI (FMI 1.0 and 2.0).
     pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
         let flags = self.description().stepped();
         let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);

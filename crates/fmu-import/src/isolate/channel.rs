@@ -1,8 +1,8 @@
 //! The turn-taking of master and worker: one side posts a turn and waits for the next one.
 //!
-//! The waiter spins, then yields, then blocks until a byte arrives at the socket. Spinning is fastest
-//! if each side has a processor, yielding if both share one, blocking serves long steps. A closed
-//! socket shows that the other side has ended.
+//! The waiter spins, then yields, then blocks until a byte arrives at the socket. Spinning is fastest if each side has
+//! a processor, yielding if both sides share a processor; blocking serves long steps. A closed socket shows that the
+//! other side has ended.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -15,7 +15,7 @@ use super::layout::Shared;
 
 /// Number of reads of the turn counter before the first yield.
 const SPINS: u32 = 10;
-/// How long a wait yields the processor before it blocks.
+/// Time for which a wait yields the processor before the thread blocks.
 const YIELD_TIME: Duration = Duration::from_micros(60);
 /// A yield that takes this long shows that other programs use the processor.
 const CONTENDED: Duration = Duration::from_micros(500);
@@ -36,7 +36,7 @@ pub(super) enum WaitResult {
     Turn(u64),
     /// The turn has not changed within the read timeout of the socket.
     TimedOut,
-    /// The other side has ended.
+    /// The process at the other end of the channel has ended.
     Closed,
 }
 

@@ -33,7 +33,7 @@ const END_LIMIT: Duration = Duration::from_secs(2);
 const FREE_LIMIT: Duration = Duration::from_secs(10);
 /// Time limit for a new process to become a worker.
 const START_LIMIT: Duration = Duration::from_secs(20);
-/// Least number of variables for which the shared memory has room if structural parameters may enlarge arrays.
+/// Least number of variables for which the shared memory has room, if structural parameters may enlarge arrays.
 const ROOM_FOR_ARRAYS: usize = 1 << 16;
 
 /// An instance in a separate process.
@@ -59,13 +59,13 @@ pub struct Isolated {
     slice: Duration,
     /// When the process was started.
     started: Instant,
-    /// The bytes of a request or an answer, kept so that small ones need no allocation.
+    /// The bytes of a request or an answer, kept so that small messages need no allocation.
     pub(super) message: Vec<u8>,
-    /// The unpacked FMU, removed with its last instance.
+    /// The unpacked FMU, whose files are removed with the last instance.
     pub(super) package: Arc<Unpacked>,
     /// The version of the FMU, for the names of functions.
     pub(super) version: Version,
-    /// The description of the instance; `None`: that of the package.
+    /// The description of the instance if it differs from the description of the package.
     pub(super) description: Option<ModelDescription>,
     /// [`Integration::describe`](super::Integration::describe) of an instance for model exchange.
     pub(super) describe: Option<Describe>,
@@ -322,7 +322,7 @@ impl Isolated {
     }
 
     /// Kills the worker after a failure. Returns the error with the name of the C function that the worker called or,
-    /// if it called none, of the command.
+    /// if the worker called none, the name of the command.
     #[cold]
     pub(super) fn abandon(&mut self, function: Function, failure: Failure) -> CallError {
         self.process.kill();
@@ -389,7 +389,7 @@ fn check_outcome(name: &str, answer: Result<Opening, CallError>) -> Result<(), I
     }
 }
 
-/// Converts the description of an instance for model exchange to that of the slave that integrates it.
+/// Converts the description of a model-exchange instance to the description of the slave that integrates it.
 pub(super) type Describe = fn(&ModelDescription) -> ModelDescription;
 
 /// Returns the number of variables for which the shared memory has room. Unused pages take no memory.
@@ -399,8 +399,7 @@ fn room_of(description: &ModelDescription) -> usize {
     variables.len().max(if resizes { ROOM_FOR_ARRAYS } else { 0 })
 }
 
-/// Returns the description of an instance if it differs from that of its FMU. On failure returns the
-/// reason.
+/// Returns the description of an instance if it differs from the description of the FMU. On failure returns the reason.
 pub(super) fn description_of_instance(
     description: &ModelDescription,
     sizes: &HashMap<u32, u64>,

@@ -47,7 +47,7 @@ fields! {
     worker_sleeps = 2 * SPACING;
     /// The command for the worker.
     command = 3 * SPACING;
-    /// The number of the function that the worker executes: the command, or the present part of it.
+    /// The number of the function that the worker executes: the command, or the present part of the command.
     place = 4 * SPACING;
     /// Number of words written to the message ring.
     log_head = 5 * SPACING;

@@ -1,5 +1,5 @@
-//! The answers of a worker and its errors, and how messages are encoded: by `postcard`. The FMU may have overwritten
-//! the shared memory: messages are decoded from a copy, and [`decode`] returns `None` for invalid bytes.
+//! The answers of a worker and its errors, encoded by `postcard`. The FMU may have overwritten the shared memory:
+//! messages are decoded from a copy, and [`decode`] returns `None` for invalid bytes.
 
 use fmu_description::Version;
 use fmu_description::abi::Status;
@@ -22,7 +22,7 @@ pub(super) enum Opening {
     NotPreloaded(String),
 }
 
-/// A [`CallError`] as a worker sends it.
+/// A [`CallError`] in the form in which a worker sends it.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct RemoteError {
     function: String,

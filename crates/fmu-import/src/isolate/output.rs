@@ -6,8 +6,8 @@ use std::time::Duration;
 
 /// Maximum number of bytes forwarded per worker.
 const MAX_BYTES: u64 = 1 << 20;
-/// How long to wait for the last output of a worker that has ended. A process that left the worker's
-/// group may hold the pipe open for ever.
+/// Time limit for the last output of a worker that has ended. A process that left the worker's group may hold the pipe
+/// open for ever.
 const DRAIN_LIMIT: Duration = Duration::from_millis(500);
 
 /// A thread that forwards the data of a pipe until its last writer closes it.

@@ -44,7 +44,7 @@ pub(super) struct Maker {
     pub(super) fmu: Fmu,
     /// The integrator and its options, for model exchange.
     pub(super) integration: Option<(Integrator, String)>,
-    /// Whether the instances get copies of arrays, with canaries.
+    /// Whether calls pass copies of arrays with canaries to the FMU, to detect writes outside an array.
     pub(super) guards: bool,
 }
 

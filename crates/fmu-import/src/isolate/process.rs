@@ -23,7 +23,7 @@ const PAUSE: Duration = Duration::from_millis(1);
 pub(super) struct Process {
     child: Child,
     output: Output,
-    /// How the process ended; `None` while it runs.
+    /// The cause of the end of the process; `None` while the process runs.
     ended: Option<Failure>,
 }
 
@@ -57,7 +57,7 @@ impl Process {
         i32::try_from(self.child.id()).ok().and_then(Pid::from_raw)
     }
 
-    /// Returns how the process ended; `None` while it runs.
+    /// Returns the cause of the end of the process; `None` while the process runs.
     pub(super) fn ended(&mut self) -> Option<Failure> {
         let pid = self.pid()?;
         if self.ended.is_none() {
@@ -69,7 +69,7 @@ impl Process {
         self.ended.clone()
     }
 
-    /// Waits up to `limit` for the end of the process; returns how it ended.
+    /// Waits up to `limit` for the end of the process; returns the cause of this end.
     pub(super) fn wait_for_end(&mut self, limit: Duration) -> Option<Failure> {
         let start = Instant::now();
         loop {
@@ -88,7 +88,7 @@ impl Process {
         }
     }
 
-    /// Kills the process group and records how the process ended.
+    /// Kills the process group and records the cause of the end of the process.
     fn end_group(&mut self) {
         if let Some(pid) = self.pid() {
             // Fails if no process of the group is alive.

@@ -10,7 +10,7 @@ use super::function::Function;
 use super::perform::{invalid_command, reply};
 use slave::{CallError, Events, Slave, absent};
 
-/// A list that the master borrows from its caller, and that the worker receives as its own.
+/// A list that the master borrows from its caller, and that the worker owns after decoding.
 type List<'a, T> = Cow<'a, [T]>;
 
 /// Defines the requests that the worker itself answers, and the requests in the table, which its instance answers. A
@@ -28,7 +28,7 @@ macro_rules! requests {
                 name: &$a str,
                 logging: bool,
             },
-            /// Asks what the FMU has changed in the process.
+            /// Asks which process-wide settings the FMU has changed.
             ProcessChanges,
             Free,
             $($request($($type),*),)*
@@ -130,7 +130,7 @@ fn filled<T: Clone + Default>(
     fill(&mut values).map(|()| values)
 }
 
-/// Returns the interface for the events of an instance; an error if it has none.
+/// Returns the interface for the events of an instance; an error for an instance without events.
 fn events(instance: &mut dyn Slave) -> Result<&mut dyn Events, CallError> {
     instance.events().ok_or_else(|| absent("fmi3EnterEventMode"))
 }

@@ -72,8 +72,8 @@ impl Isolated {
         }
     }
 
-    /// Appends the bytes of an encoded answer to `message`, in parts if the answer is longer than the
-    /// shared memory; `None` if it is invalid.
+    /// Appends the bytes of an encoded answer to `message`, in parts if the answer is longer than the shared memory;
+    /// `None` if the answer is invalid.
     fn download(&mut self, message: &mut Vec<u8>) -> Result<Option<()>, CallError> {
         let mut reader = Reader::new(self.channel.shared.area());
         let head = (reader.take(), reader.take());

@@ -49,7 +49,7 @@ const BUFFER: usize = 1 << 16;
 ///
 /// # Errors
 ///
-/// [`WorkerError::Alone`] if no master started this process, or if it cannot set up what a worker needs;
+/// [`WorkerError::Alone`] if no master started this process, or if memory or connection of the worker cannot be set up;
 /// [`WorkerError::Corrupted`] if the FMU overwrote the shared memory.
 pub fn worker() -> Result<(), WorkerError> {
     run(None)
@@ -150,7 +150,7 @@ struct Worker {
     shared: Arc<Shared>,
     integrator: Option<Integrator>,
     executor: Option<Executor>,
-    /// The bytes of the next request that have arrived so far.
+    /// The parts of the next request that have arrived so far, joined.
     request: Vec<u8>,
     /// The process-wide settings before the FMU was loaded.
     before: Surroundings,
@@ -260,7 +260,7 @@ impl Worker {
         })
     }
 
-    /// Stores the present part of a command, so that the master can name it after a crash between two C calls.
+    /// Stores the present part of a command, so that the master can name this part after a crash between two C calls.
     fn record(&self, function: Function) {
         self.shared.place().store(function.to_word(), Ordering::Relaxed);
     }

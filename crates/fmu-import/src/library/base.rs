@@ -43,17 +43,17 @@ pub(crate) struct Base<F> {
     /// Receives messages; the FMU holds its address. An FMU of FMI 1.0 does not return the address: the logger finds
     /// the sink by the thread or by the name of the instance.
     sink: Arc<Sink>,
-    /// The callbacks of FMI 2.0; the FMU holds their address.
+    /// The callbacks of FMI 2.0, kept alive because the FMU holds their address.
     pub(super) callbacks: Option<Arc<fmi2CallbackFunctions>>,
     /// FMU states by slot; null in an empty slot.
     pub(super) saved: Vec<*mut c_void>,
-    /// How long a step that returned `fmi2Pending` may take; `None`: no limit.
+    /// Time limit for a step that returned `fmi2Pending`; `None`: no limit.
     pub(crate) time_limit: Option<Duration>,
-    /// Whether the instance still computes a step that could not be canceled; then it must not be freed.
+    /// Whether the instance still computes a step that could not be canceled, so that the instance must not be freed.
     pub(super) abandoned: bool,
     /// Whether a call has returned `fmi2Warning`.
     warned: Cell<bool>,
-    /// Whether calls get copies of arrays, with canaries.
+    /// Whether calls pass copies of arrays with canaries to the FMU, to detect writes outside an array.
     pub(super) guards: bool,
     /// Receives a text for each call, if calls are logged; in FMI 3.0 only.
     call_sink: Option<RefCell<CallSink>>,
@@ -99,8 +99,8 @@ impl<F: Copy> Base<F> {
         })
     }
 
-    /// Returns whether the instance may be freed. If not, it may still use the library, the callbacks and the sink:
-    /// they are leaked. If a call of the instance has not returned, ends the process.
+    /// Returns whether the instance may be freed. If not, library, callbacks and sink are leaked, because the instance
+    /// may still use them. If a call of the instance has not returned, ends the process.
     pub(super) fn may_be_freed(&self) -> bool {
         crash::check_returned(&self.place);
         let is_lost = self.abandoned || self.library.corrupted.load(Ordering::Relaxed);

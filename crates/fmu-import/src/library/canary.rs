@@ -1,7 +1,7 @@
-//! Canaries: copies of the arrays that an FMU gets, with a pattern before and after each.
+//! Canaries: copies of the arrays that an FMU gets, with a byte pattern before and after each array.
 //!
 //! An FMU that writes past an array, or into a constant one, changes memory of the program without an error. With
-//! guards a call gets copies, which are checked afterwards; without guards it gets the arrays themselves.
+//! guards the FMU gets copies, which are checked after the call; without guards it gets the arrays themselves.
 #![expect(unsafe_code, reason = "arrays as bytes")]
 
 use std::ffi::c_int;
@@ -10,7 +10,7 @@ use slave::Failure;
 
 /// Number of elements before and after a copy.
 const MARGIN: usize = 8;
-/// The value of every byte of these elements.
+/// The value of every byte in the margins around a copy.
 const PATTERN: u8 = 0xa5;
 /// Largest number of bytes of a state or a binary value; an FMU may state a wrong number.
 const MOST_BYTES: usize = 1 << 30;
@@ -26,7 +26,7 @@ pub(super) const BYTES: &str = "bytes";
 pub(super) const SIZES: &str = "sizes";
 const VALUES: &str = "values";
 
-/// A type whose values may have any bits.
+/// A type for which every bit pattern is a valid value.
 pub(super) trait Plain: Copy {}
 
 macro_rules! plain {
@@ -82,7 +82,8 @@ impl<T: Plain> Fence<T> {
         Some(format!("wrote {place} of its array of {}", self.what))
     }
 
-    /// Returns a phrase for a write to the array, whose values are constant, or outside it; `None` if there was none.
+    /// Returns a phrase for a write outside the array, or into it, as its values are constant; `None` without such a
+    /// write.
     fn changed(&self, values: &[T]) -> Option<String> {
         let is_same = bytes(self.values()) == bytes(values);
         let changed = (!is_same).then(|| format!("changed its constant array of {}", self.what));
@@ -188,7 +189,7 @@ pub(super) fn send<T: Plain>(
     constant(guards, VALUES, values, |array| (call(array), None))
 }
 
-/// Returns a buffer of `size` zero bytes for a state whose size the FMU states; an error if this is too large.
+/// Returns a buffer of `size` zero bytes for a state whose size the FMU states; an error if this size is too large.
 pub(super) fn bytes_of_state(size: usize) -> Result<Vec<u8>, Failure> {
     check_size(size, "state")?;
     let mut bytes = Vec::new();

@@ -13,7 +13,7 @@ use super::python;
 use crate::crash::{LOADING, Limit, Place, UNLOADING};
 use crate::error::LoadError;
 
-/// How to treat a library that calls functions that no library defines.
+/// Treatment of a library that calls functions that no library defines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Binding {
     /// Load the library with a warning, if the system can bind functions at their first call. A call of an undefined
@@ -38,8 +38,8 @@ pub(crate) struct Loading<'a> {
 }
 
 impl Loading<'_> {
-    /// Loads the library. If it lacks a symbol of Python, loads the library of Python and tries again. If another
-    /// function is undefined, loads the library with a warning where [`Binding::Lenient`] allows it.
+    /// Loads the library. If the library lacks a symbol of Python, loads the library of Python and tries again. If
+    /// another function is undefined, loads the library with a warning where [`Binding::Lenient`] allows it.
     pub(super) fn load(&self) -> Result<Handle, LoadError> {
         let place = Place::new(self.fmu);
         let open = || {
@@ -118,7 +118,7 @@ fn undefined(message: &str) -> Option<&str> {
     symbol.split([' ', ',']).next()
 }
 
-/// How long the destructors and exit handlers of a library may take.
+/// Time limit for the destructors and exit handlers of a library.
 const UNLOAD_LIMIT: Duration = Duration::from_secs(1);
 
 /// A loaded library, unloaded on drop.
@@ -148,7 +148,7 @@ impl Drop for Handle {
     }
 }
 
-/// Returns the message of the operating system, without the text that `libloading` puts before it.
+/// Returns the message of the operating system, without the prefix that `libloading` adds.
 fn reason(error: &libloading::Error) -> String {
     std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
 }

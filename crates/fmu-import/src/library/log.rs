@@ -26,8 +26,8 @@ pub(crate) type Names = Arc<dyn Fn(char, u32) -> Option<String> + Send + Sync>;
 
 /// Receives the messages of one instance.
 ///
-/// Its address is the `componentEnvironment` of the FMU. It is compared with the addresses of known
-/// sinks and never dereferenced, because some FMUs pass null or another pointer.
+/// Its address is the `componentEnvironment` of the FMU. This address is compared with the addresses of known sinks and
+/// never dereferenced, because some FMUs pass null or another pointer.
 pub(super) struct Sink {
     place: Arc<Place>,
     /// `None`: messages have no references to variables (FMI 3.0).
@@ -50,7 +50,7 @@ impl Sink {
         messages.map(Vec::from).unwrap_or_default()
     }
 
-    /// Logs a message, with names in place of value references, and keeps it for the next error.
+    /// Logs a message, with names in place of value references, and keeps the message for the next error.
     pub(super) fn receive(&self, status: c_int, category: &str, text: &str) {
         let text = match &self.names {
             Some(names) => with_names(text, &**names),

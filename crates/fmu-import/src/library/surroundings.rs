@@ -11,7 +11,7 @@ use rustix::process::getpgrp;
 /// Process-wide settings, which all libraries of a process share.
 pub(crate) struct Surroundings {
     environment: BTreeMap<OsString, OsString>,
-    /// The other properties: names and values.
+    /// Working directory, rounding mode, locale and process group: names and values.
     others: [(&'static str, String); 4],
 }
 

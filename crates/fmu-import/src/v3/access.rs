@@ -26,7 +26,7 @@ impl Instance {
         done
     }
 
-    /// Reads values. `fill` copies one value from a buffer, a text without allocation if there is room; it returns
+    /// Reads values. `fill` copies one value from a buffer, a text without allocation if there is room, and returns
     /// `None` on failure.
     pub(super) fn read<T>(
         &mut self,
@@ -61,7 +61,7 @@ impl Instance {
         })
     }
 
-    /// Passes values. `put` stores one value in a buffer; it returns `None` on failure.
+    /// Passes values. `put` stores one value in a buffer, and returns `None` on failure.
     pub(super) fn write<T: Clone + std::fmt::Debug>(
         &mut self,
         function: &'static str,
@@ -103,9 +103,8 @@ impl Instance {
         })
     }
 
-    /// Returns whether variables must be passed to the FMU. If they may change in Event Mode only and one of them
-    /// changes, enters Event Mode. `bits` returns the bits of the value at a place, which are compared with the bits
-    /// set last.
+    /// Returns whether variables must be passed to the FMU. Enters Event Mode if a variable that may change in Event
+    /// Mode only changes. `bits` returns the bits of the value at a place, which are compared with the bits set last.
     fn may_set(
         &mut self,
         event: bool,

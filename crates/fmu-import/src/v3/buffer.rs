@@ -247,8 +247,8 @@ macro_rules! buffer {
                 Some(())
             }
 
-            /// Returns the bits of value number `position`, by which its change is detected; for a String or a binary
-            /// a hash.
+            /// Returns the bits of value number `position`, by which a change of the value is detected; for a String or
+            /// a binary a hash.
             pub(super) fn bits(&self, position: usize) -> u64 {
                 match self {
                     $(Buffer::$variant(values) => values[position].bits(),)*
@@ -262,7 +262,7 @@ macro_rules! buffer {
                 }
             }
 
-            /// Stores `value` and returns true. If it is absent or of another type, stores 0, an empty text or no
+            /// Stores `value` and returns true. If `value` is absent or of another type, stores 0, an empty text or no
             /// bytes, and returns false.
             pub(super) fn put_value(&mut self, position: usize, value: Option<&ElementValue>) -> bool {
                 match self {

@@ -1,4 +1,4 @@
-//! Clocked variables. The FMU has their values only while one of their clocks ticks, in Event Mode, and in
+//! Clocked variables. A clocked variable has a value only while one of its clocks ticks, in Event Mode, and in
 //! Initialization Mode (FMI 3.0.2, section 2.2.6). The slave remembers the outputs and locals of the last tick for
 //! later reads, and the inputs for the next tick.
 
@@ -37,8 +37,8 @@ impl ClockedRuns {
 }
 
 impl Instance {
-    /// Returns whether the variables of a run can be neither read nor set now: the initialization has ended, they are
-    /// clocked, and none of their clocks ticks. False in scheduled execution.
+    /// Returns whether the variables of a run can be neither read nor set now: the initialization has ended, the
+    /// variables are clocked, and no clock of theirs ticks. False in scheduled execution.
     pub(super) fn is_silent(&self, run: &Run) -> bool {
         let is_clocked = !run.clocks.is_empty() && !self.is_scheduled();
         let ticks = || self.state.mode == Mode::Event && self.state.clocks.is_active(&run.clocks);

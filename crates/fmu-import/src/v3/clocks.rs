@@ -1,5 +1,5 @@
-//! Clocks (FMI 3.0.2, section 2.2.8). The slave ticks the input clocks that are based on time; the master triggers
-//! the other ones. The ticks of a step are kept for the results until the next step.
+//! Clocks (FMI 3.0.2, section 2.2.8). The slave ticks the input clocks that are based on time; the master triggers the
+//! triggered clocks. The ticks of a step are kept for the results until the next step.
 
 use std::collections::HashMap;
 
@@ -14,7 +14,7 @@ use crate::error::refused;
 use crate::library::v3::Component;
 use slave::CallError;
 
-/// A clock is due already when its tick is nearer than this fraction of the interval or of the time.
+/// Tolerance for the next tick, relative to the interval or the time: a clock whose tick is nearer is already due.
 const ROUNDING: f64 = 1e-9;
 /// Upper limit of this tolerance in s, besides half of the interval; the tolerance is never below four units in the
 /// last place of the time.
@@ -40,7 +40,7 @@ struct TimedClock {
     first: f64,
     /// Number of ticks since `first`.
     ticks: u64,
-    /// Time of the next tick in s, if it is known.
+    /// Time of the next tick in s; `None` if unknown.
     next: Option<f64>,
     /// Whether a warning about a forbidden interval was logged.
     #[serde(skip)]
@@ -119,14 +119,14 @@ impl TimedClock {
         matches!(self.attributes.interval_variability, Constant | Fixed | Tunable)
     }
 
-    /// Returns the interval in s that the description states, if it does.
+    /// Returns the interval in s that the description states; `None` without a stated interval.
     fn stated_interval(&self) -> Option<f64> {
         let attributes = &self.attributes;
         seconds(attributes.interval_decimal, attributes.interval_counter, attributes.resolution)
     }
 
-    /// Returns whether to ask the FMU for the interval in an event; `has_ticked`: whether the clock ticked in it.
-    /// Only the importer changes an interval that the description states.
+    /// Returns whether to ask the FMU for the interval in an event; `has_ticked`: whether the clock ticked in this
+    /// event. Only the importer changes an interval that the description states.
     fn is_asked(&self, has_ticked: bool) -> bool {
         match self.attributes.interval_variability {
             IntervalVariability::Countdown => true,
@@ -177,8 +177,8 @@ impl Clocks {
     }
 
     /// Determines the first ticks, in Initialization Mode: asks the FMU for intervals that its description does not
-    /// state, and for the shifts of these clocks unless it states them. An interval that is not positive or a negative
-    /// shift of a periodic clock is an error.
+    /// state, and for the shifts of these clocks that the description does not state. An interval that is not positive
+    /// or a negative shift of a periodic clock is an error.
     pub(super) fn start(&mut self, component: &mut Component, start: f64) -> Result<(), CallError> {
         for clock in &mut self.timed {
             let (attributes, stated) = (&clock.attributes, clock.stated_interval());
@@ -352,7 +352,7 @@ impl Clocks {
         }
     }
 
-    /// Returns the clocks of a run whose value is true; an error if one is no triggered input clock.
+    /// Returns the clocks of a run whose value is true; an error if a variable of the run is no triggered input clock.
     fn triggered(&self, function: &'static str, run: &Run) -> Result<Vec<u32>, CallError> {
         let all = run.references.iter().enumerate();
         let set = all.filter(|(place, _)| run.buffer.integer(*place) != Some(0));

@@ -13,7 +13,7 @@ struct Whole {
     references: Vec<u32>,
     /// Number of all elements of the variables.
     count: usize,
-    /// Position of each value of the list among these elements.
+    /// For each value of the list, its position among all elements of the variables.
     places: Vec<usize>,
 }
 
@@ -74,8 +74,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Sets the derivatives of inputs for the next step, which starts with their present values. An input for which
-    /// the FMU does not ask within a step is held constant.
+    /// Sets the derivatives of inputs for the next step, which starts with the present values of these inputs. An input
+    /// that the FMU does not request within a step is held constant.
     pub(crate) fn set_input_derivatives(
         &mut self,
         list: &[u32],

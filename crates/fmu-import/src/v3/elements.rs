@@ -13,8 +13,8 @@ use fmu_description::{
 
 /// Largest number of elements of all arrays together.
 const MOST_ELEMENTS: usize = 1 << 24;
-/// Largest number of dependencies between elements of all unknowns together; beyond it the dependencies of an unknown
-/// are not stated.
+/// Largest number of dependencies between elements of all unknowns together; beyond this number the dependencies of an
+/// unknown are not stated.
 const MOST_DEPENDENCIES: usize = 1 << 22;
 
 /// A variable of the FMU: a scalar or an array.
@@ -28,15 +28,15 @@ pub(super) struct Variable {
     /// Whether the variable may change in Event Mode only, once the FMU is initialised (FMI 3.0.2,
     /// section 4.2.1): all but continuous inputs without clocks.
     pub(super) event: bool,
-    /// Whether the FMU asks for this input within a step: one of type `Float64` with `intermediateUpdate`.
+    /// Whether the FMU requests this input within a step: an input of type `Float64` with `intermediateUpdate`.
     pub(super) intermediate: bool,
     /// Value references of the clocks of the variable.
     pub(super) clocks: Vec<u32>,
-    /// For a variable with `event`, the position of its first element among all elements of such variables.
+    /// Position of the first element among the elements of all variables with `event`; unused without `event`.
     pub(super) shadow: usize,
 }
 
-/// The scalar variables of an FMU, and where their values are.
+/// The scalar variables of an FMU, with the positions of their values in the arrays of the FMU.
 #[derive(Clone, Debug)]
 pub(crate) struct ElementView {
     /// The description with a scalar variable for each element.
@@ -113,7 +113,7 @@ impl ElementView {
     }
 
     /// Returns the positions of variable and element of a value reference of [`ElementView::description`]; `None` if no
-    /// variable has it.
+    /// variable has the reference.
     pub(super) fn locate(&self, reference: u32) -> Option<(usize, usize)> {
         let virtual_position = reference.wrapping_sub(self.base) as usize;
         match self.cells.get(virtual_position) {
@@ -215,7 +215,8 @@ struct Builder {
     view: ElementView,
     /// Position in `cells` of the first element of each array, by value reference.
     first_cell: HashMap<u32, usize>,
-    /// For each variable of the FMU, the position of its first element in the new description and their number.
+    /// For each variable of the FMU, the position of its first element in the new description and its number of
+    /// elements.
     ranges: Vec<(usize, usize)>,
 }
 
@@ -314,7 +315,7 @@ impl Builder {
         }
     }
 
-    /// Converts the indices by which variables refer to each other. Fails if two have one name.
+    /// Converts the indices by which variables refer to each other. Fails if two variables have one name.
     fn finish(mut self, description: &ModelDescription) -> Result<ElementView, String> {
         let mut names = HashSet::new();
         let variables = &self.view.description.variables;
@@ -371,7 +372,7 @@ impl Builder {
     }
 
     /// Expands the rows to all elements. Each element depends on all elements of the dependencies; beyond
-    /// [`MOST_DEPENDENCIES`] its dependencies are not stated.
+    /// [`MOST_DEPENDENCIES`] the dependencies of an element are not stated.
     fn rows(&self, rows: &[Unknown]) -> Vec<Unknown> {
         let mut all = Vec::new();
         let mut left = MOST_DEPENDENCIES;

@@ -11,10 +11,10 @@ use slave::{CallError, EventInfo, Events, Failure, StepResult, time_rounding};
 const UPDATES: u32 = 1000;
 /// Largest number of successive parts of a step that make no progress.
 const STANDSTILLS: u32 = 1000;
-/// Largest difference, as a fraction of the step, between the time of an FMU that adds it up itself and that of its
-/// importer.
+/// Largest difference between the time that an FMU adds up itself and the time of its importer, as a fraction of the
+/// step.
 const DEVIATION: f64 = 1e-3;
-/// After `fmi3Discard` a part of a step is tried with half its size if it is larger than this fraction of the step.
+/// Smallest part of a step, as a fraction of the step, that is tried again with half its size after `fmi3Discard`.
 const SMALLEST: f64 = 1e-6;
 
 /// The mode of the FMU.
@@ -49,7 +49,7 @@ impl Instance {
         if self.event_mode && !self.hands_over_events { self.handle_event() } else { Ok(()) }
     }
 
-    /// Enters Event Mode, if the FMU is not in it.
+    /// Enters Event Mode, unless the FMU is already in Event Mode.
     pub(super) fn enter_event(&mut self) -> Result<(), CallError> {
         if self.state.mode != Mode::Event {
             if !self.is_scheduled() {
@@ -89,14 +89,14 @@ impl Instance {
         self.leave_event_mode()
     }
 
-    /// Hands the events over to the master: a step ends at an event at its end or, with `stop`, at the first event.
-    /// Returns whether the FMU was instantiated with `eventModeUsed`; always false in model exchange.
+    /// Hands the events over to the master: a step stops at events at its end only or, with `stop`, at the first event
+    /// within it. Returns whether the FMU was instantiated with `eventModeUsed`; always false in model exchange.
     pub(crate) fn hand_over_events(&mut self, stop: bool) -> bool {
         (self.hands_over_events, self.stops_at_events) = (true, stop);
         self.event_mode
     }
 
-    /// Steps from `time` over `size` s; handles the events within the step and at its end, unless the master does.
+    /// Steps from `time` over `size` s. Handles the events within the step and at its end if the master does not.
     pub(crate) fn do_step(
         &mut self,
         time: f64,

@@ -18,7 +18,7 @@ struct Plan {
     runs: Vec<Run>,
 }
 
-/// One call: variables of one type with the same clocks. Either all of them may change in Event Mode only, or none.
+/// One call: variables of one type with the same clocks. Either all variables may change in Event Mode only, or none.
 #[derive(Debug)]
 pub(super) struct Run {
     pub(super) kind: NativeType,
@@ -32,7 +32,7 @@ pub(super) struct Run {
     pub(super) places: Vec<(usize, usize)>,
     /// For each value of the call, its position among all elements that may change in Event Mode only.
     pub(super) shadows: Vec<usize>,
-    /// Whether the list lacks elements of an array; these keep their values.
+    /// Whether the list lacks elements of an array. The missing elements keep their values.
     pub(super) partial: bool,
     pub(super) buffer: Buffer,
 }

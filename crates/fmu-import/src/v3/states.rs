@@ -55,7 +55,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Returns the state of the slave, then the state of the FMU. In Event Mode it first handles the event.
+    /// Returns the state of the slave, then the state of the FMU. In Event Mode, handles the event first.
     pub(crate) fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         if self.state.mode == Mode::Event {
             // A serialised state is never in Event Mode.

@@ -27,7 +27,7 @@ pub(crate) struct InputElement {
     pub(crate) reference: u32,
     /// Number of elements of the input.
     pub(crate) size: usize,
-    /// Position among these elements.
+    /// Position of the element among all elements of the input.
     pub(crate) element: usize,
 }
 
@@ -42,7 +42,7 @@ pub(super) struct Inputs {
     asked_time: Option<f64>,
     /// The whole inputs that have had derivatives in this or an earlier step.
     pub(super) references: Vec<u32>,
-    /// The values of their elements at the start of the step.
+    /// The values of the elements of these inputs at the start of the step.
     pub(super) values: Vec<f64>,
     /// The derivatives of order 1 to [`ORDERS`] of the elements for this step.
     derivatives: Vec<[f64; ORDERS]>,
@@ -50,7 +50,7 @@ pub(super) struct Inputs {
     index: HashMap<u32, usize>,
     /// Buffer for the values at a time within the step.
     present: Vec<f64>,
-    /// The instance of the step and its function to set the inputs.
+    /// The instance that steps, and its function to set inputs; `None` outside a step.
     target: Option<(Instance, SetFloat64)>,
 }
 

@@ -57,7 +57,7 @@ impl Component {
     }
 
     /// Sets the derivatives of the inputs for which `locate` returns an element, for the step from `start` s. Reads the
-    /// present values of these inputs, which are those at `start`. An order beyond [`ORDERS`] is an error.
+    /// present values of these inputs, the values at `start`. An order beyond [`ORDERS`] is an error.
     pub(crate) fn set_input_derivatives(
         &mut self,
         list: &[u32],
