@@ -7,7 +7,7 @@ macro_rules! functions {
     ($($name:ident)*) => { [$(concat!("fmi", stringify!($name))),*] };
 }
 
-/// The names of all functions of a library for co-simulation, without the prefix.
+/// The names of all functions of a library for co-simulation, without the prefix `model_`.
 pub const FUNCTIONS: [&str; 25] = functions! {
     GetTypesPlatform GetVersion SetDebugLogging
     InstantiateSlave InitializeSlave TerminateSlave ResetSlave FreeSlaveInstance

@@ -43,7 +43,7 @@ pub type fmi3IntervalQualifier = c_int;
 /// The result of `fmi3GetVersion`, for every 3.0.x.
 pub const VERSION: &std::ffi::CStr = c"3.0";
 
-/// Returns the names of all functions of `fmi3Functions.h`, in its order; a library exports all of them (section 2.5).
+/// Returns the names of all functions in `fmi3Functions.h`, in this order; a library exports all of them (section 2.5).
 pub fn functions() -> impl Iterator<Item = &'static str> {
     let first = [
         "fmi3GetVersion",

@@ -43,7 +43,7 @@ states! {
     ContinuousTimeMode,
     /// Co-simulation: after `fmi2ExitInitializationMode` or a completed step.
     StepComplete,
-    /// Co-simulation: while `fmi2DoStep` runs, also after it returned `fmi2Pending`.
+    /// Co-simulation: `fmi2DoStep` runs, or has returned `fmi2Pending` and its step is not finished.
     StepInProgress,
     /// Co-simulation: after `fmi2DoStep` returned `fmi2Discard`.
     StepFailed,
@@ -172,9 +172,9 @@ functions! {
     }
 }
 
-/// Returns the set of states in which a variable may be set ([`State::bit`]): conditions 1, 3 and 6 of
-/// section 4.2.4, 4 and 5 of section 3.2.3. The set also has inputs before initialization mode, because
-/// importers set them there. `is_state` is true for a continuous state.
+/// Returns the set of states in which a variable may be set ([`State::bit`]): conditions 1, 3 and 6 of section 4.2.4, 4
+/// and 5 of section 3.2.3. The set also has inputs before initialization mode, because importers set inputs there.
+/// `is_state` is true for a continuous state.
 #[must_use]
 pub fn settable(
     causality: Causality,

@@ -33,7 +33,7 @@ pub enum Operation {
     },
     /// A node states its bit rate, before it sends its first frame.
     Configure {
-        /// In bit/s.
+        /// The bit rate in bit/s.
         bit_rate: u32,
     },
     /// An error on the bus ended the frame with this identifier.
@@ -75,7 +75,7 @@ pub enum FrameKind {
 impl Operation {
     /// Reads the operations in `bytes`, in order.
     ///
-    /// Skips an operation that this type does not have, or whose arguments are too short. An operation that ends
+    /// Skips an operation that [`Operation`] does not have, or whose arguments are too short. An operation that ends
     /// beyond `bytes`, or states a length below 8, ends the sequence.
     pub fn read(bytes: &[u8]) -> impl Iterator<Item = Operation> {
         let mut rest = bytes;
@@ -136,7 +136,8 @@ impl Frame {
     }
 }
 
-/// Returns the operation with these arguments; `None` if they are too short or if [`Operation`] does not have it.
+/// Returns the operation `code` with `arguments`; `None` for too short arguments or an operation unknown to
+/// [`Operation`].
 fn operation(code: u32, arguments: &[u8]) -> Option<Operation> {
     if code == CONFIGURATION {
         let bit_rate = number(arguments, 1).filter(|_| arguments[0] == BIT_RATE)?;

@@ -54,7 +54,7 @@ pub enum ParseError {
         at: Position,
         what: &'static str,
         limit: usize,
-        /// [`HELP`] if the limit can be lifted, otherwise empty.
+        /// [`HELP`] if a limit refused the file and can be lifted, otherwise empty.
         help: &'static str,
     },
     /// The file is of an unknown version of the standard.
@@ -96,7 +96,7 @@ pub struct Warning {
     pub assumed: String,
     /// Section of the standard: FMI 2.0.5 or 3.0.2, for FMI 1.0 the document on co-simulation.
     pub section: &'static str,
-    /// Whether validation against the schema of the standard reports it too.
+    /// Whether validation against the schema of the standard also reports the defect.
     pub by_schema: bool,
 }
 

@@ -117,8 +117,8 @@ impl ModelDescription {
         self.co_simulation.clone().or_else(scheduled)
     }
 
-    /// Returns the variable with a 1-based index, as `structure`, `derivative`, `previous` and `clocks`
-    /// have it; `None` for 0 and beyond the last variable.
+    /// Returns the variable with a 1-based index, the form in `structure`, `derivative`, `previous` and `clocks`;
+    /// `None` for 0 and beyond the last variable.
     #[must_use]
     pub fn at(&self, index: u32) -> Option<&ScalarVariable> {
         self.variables.get(usize::try_from(index).ok()?.checked_sub(1)?)

@@ -76,7 +76,7 @@ fn section(heading: &str, content: &str) -> String {
     format!("<h2>{heading}</h2>\n{content}\n")
 }
 
-/// Renders text as a paragraph with its line breaks; empty if it is absent or only white space.
+/// Renders text as a paragraph with its line breaks; empty if the text is absent or only white space.
 fn paragraph(text: Option<&str>) -> String {
     let text = text.filter(|text| !text.trim().is_empty());
     text.map(|text| format!("<p>{}</p>\n", escaped(text).replace('\n', "<br/>\n")))
@@ -176,7 +176,7 @@ fn list(elements: &Elements) -> String {
 
 /// Returns the unit, and start, min and max, as texts; an absent value is an empty text.
 ///
-/// `types` are the types of the description; they name the items of enumerations. The start of a Clock is its
+/// `types` are the types of the description, with the names of the items of enumerations. The start of a Clock is its
 /// interval in s.
 #[must_use]
 pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {

@@ -11,7 +11,7 @@ pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// Serialises a field after its number, which is unique within its structure.
+/// Serialises a field after its number, which is unique within the structure of the field.
 pub(crate) fn numbered<const NUMBER: u8, T: Serialize, S: Serializer>(
     value: &T,
     serializer: S,

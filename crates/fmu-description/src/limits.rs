@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-/// Environment variable that lifts the limits if it is `1`.
+/// Environment variable with the value `1` that lifts the limits on size and depth of files.
 pub const LIFT: &str = "ASO_FTC_TRUST_FILES";
 
 /// The end of a message about a limit: its purpose, and how to lift it.

@@ -12,11 +12,11 @@ use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_decode_str, percent_e
 /// All characters except the unreserved ones of RFC 3986, section 2.3, and the separator.
 const ENCODED: AsciiSet =
     NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~').remove(b'/');
-/// The same set for a path with a drive letter, without the colon.
+/// [`ENCODED`] without the colon, for a path with a drive letter.
 const ENCODED_AFTER_DRIVE: AsciiSet = ENCODED.remove(b':');
 
-/// The resource folder that a model receives if the importer names none. Its first character, NUL, makes
-/// it an invalid path on every platform, so that a model cannot read the working directory instead.
+/// The resource folder that a model receives if the importer names none. The first character, NUL, makes this path
+/// invalid on every platform, so that a model cannot read the working directory instead.
 pub const NO_FOLDER: &str = "\0(no fmuResourceLocation)";
 
 /// The error of a conversion between a path and a URI.

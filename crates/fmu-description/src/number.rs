@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Significant digits of a time; the rounding error of a sum of steps is smaller than the last of them.
+/// Significant digits of a time; the rounding error of a sum of steps is smaller than the last digit.
 const TIME: usize = 12;
 
 /// Returns `value`, rounded to `digits` significant digits (1 to 15), without trailing zeros after the decimal point.

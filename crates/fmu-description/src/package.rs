@@ -48,7 +48,7 @@ pub enum PackageError {
         path: PathBuf,
         limit: u64,
         unit: &'static str,
-        /// [`crate::limits::HELP`] if the limit can be lifted, otherwise empty.
+        /// [`crate::limits::HELP`] if a limit refused the archive and can be lifted, otherwise empty.
         help: &'static str,
     },
     /// The model description cannot be read.

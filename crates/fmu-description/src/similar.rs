@@ -16,8 +16,8 @@ pub fn nearest(description: &ModelDescription, name: &str) -> String {
     if similar.is_empty() { String::new() } else { format!(", it has {}", similar.join(", ")) }
 }
 
-/// Returns the five most similar of those `names` that contain `name`, are contained in it, or have an edit distance
-/// of at most two, ignoring case; in the order of their edit distance.
+/// Returns the five most similar of those `names` that contain `name`, are contained in `name`, or have an edit
+/// distance of at most two to it, ignoring case; in the order of their edit distance.
 #[must_use]
 pub fn among<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str> {
     let lower = name.to_ascii_lowercase();

@@ -105,7 +105,7 @@ pub enum UnitError {
     )]
     UnknownName {
         expression: String,
-        /// Where the name starts.
+        /// Column at which the name of the unit starts.
         column: usize,
         name: String,
     },
@@ -118,14 +118,14 @@ pub enum UnitError {
         expected: &'static str,
         actual: String,
     },
-    /// A unit with an offset (such as degC) is part of a larger expression, where it has no meaning.
+    /// A unit with an offset (such as degC) is part of a larger expression, where an offset has no meaning.
     #[error(
         "unit {expression:?}, column {column}: {name} has an offset and can only stand alone, \
          expected a unit without one, such as K"
     )]
     Offset {
         expression: String,
-        /// Where the name starts.
+        /// Column at which the name of the unit starts.
         column: usize,
         name: String,
     },

@@ -28,7 +28,7 @@ pub struct Element {
 }
 
 /// Reads the root element of a file in UTF-16 or UTF-8, recognised by a byte order mark or, for UTF-16, by the first
-/// character `<`; otherwise in the encoding that the file declares; UTF-8 if it declares none.
+/// character `<`; otherwise in the encoding that the file declares; UTF-8 if the file declares none.
 ///
 /// # Errors
 ///

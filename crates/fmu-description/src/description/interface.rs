@@ -136,7 +136,7 @@ pub struct CoSimulation {
     /// `fixedInternalStepSize` in s (FMI 3.0).
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<5, _, _>")]
     pub fixed_internal_step_size: Option<f64>,
-    /// `recommendedIntermediateInputSmoothness` (FMI 3.0): how often inputs should be continuously differentiable.
+    /// `recommendedIntermediateInputSmoothness` (FMI 3.0): number of continuous derivatives that inputs should have.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<6, _, _>")]
     pub recommended_intermediate_input_smoothness: i32,
     /// `providesEvaluateDiscreteStates` (FMI 3.0).

@@ -46,7 +46,7 @@ macro_rules! kinds {
                 match self { $(Kind::$variant(_) => NativeType::$native,)* }
             }
 
-            /// Returns the type of the element `name` of FMI 3.0, without attributes; `None` if there is none.
+            /// Returns the type of the element `name` of FMI 3.0, without attributes; `None` if `name` is no type.
             pub(super) fn blank(name: &str) -> Option<Self> {
                 match name {
                     $($element_of_3 => Some(Kind::$variant(<$attributes>::default())),)*
@@ -66,7 +66,7 @@ kinds! {
     Boolean(Option<bool>): "Boolean" "Boolean" Boolean;
     /// Holds `start`.
     String(Option<String>): "String" "String" String;
-    /// Its values are integers; the type `declared_type` names the items.
+    /// Integer values; the type `declared_type` names the items.
     Enumeration(IntegerType): "Enumeration" "Enumeration" Int64;
     /// Each number is an `f32`.
     Float32(RealType): "Float32" "Float32" Float32;
@@ -135,7 +135,7 @@ impl Kind {
         }
     }
 
-    /// Returns the attributes that [`Kind::as_real`] returns, to change them.
+    /// Returns the attributes of [`Kind::as_real`] to change them.
     pub fn as_real_mut(&mut self) -> Option<&mut RealType> {
         match self {
             Kind::Real(real) | Kind::Float32(real) => Some(real),
@@ -143,7 +143,7 @@ impl Kind {
         }
     }
 
-    /// Returns the attributes that [`Kind::as_integer`] returns, to change them.
+    /// Returns the attributes of [`Kind::as_integer`] to change them.
     pub fn as_integer_mut(&mut self) -> Option<&mut IntegerType> {
         match self {
             integers!(integer) => Some(integer),

@@ -18,7 +18,7 @@ pub struct ModelStructure {
     /// `ClockedState` (FMI 3.0).
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<1, _, _>")]
     pub clocked_states: Vec<Unknown>,
-    /// `EventIndicator` (FMI 3.0): variables. FMI 2.0 states only their number.
+    /// `EventIndicator` (FMI 3.0): the event indicators, which are variables. FMI 2.0 states only their number.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<2, _, _>")]
     pub event_indicators: Vec<Unknown>,
 }

@@ -11,7 +11,7 @@ macro_rules! native_types {
         }
 
         impl NativeType {
-            /// Returns the `{VariableType}` in the names of its functions.
+            /// Returns the `{VariableType}` in the names of the type's functions, as in `fmi3GetFloat64`.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {

@@ -42,12 +42,12 @@ impl ModelDescription {
 
     /// Reads `modelDescription.xml` of FMI 1.0, 2.0 or 3.0; returns warnings for content that breaks the standard.
     ///
-    /// Fills in the defaults of the standard: `causality` local, `variability` by version and type,
-    /// and for a variable with `declaredType` the attributes of that type which it does not state
-    /// itself. Skips annotations.
+    /// Fills in the defaults of the standard: `causality` local, `variability` by version and type, and for a variable
+    /// with `declaredType` the attributes of the declared type that the variable does not state itself. Skips
+    /// annotations.
     ///
     /// FMI 3.0: value references in `derivative`, `previous`, `clocks` and `ModelStructure` become indices; each
-    /// `Alias` becomes a variable after the one that contains it.
+    /// `Alias` becomes a variable after the variable that contains it.
     ///
     /// FMI 1.0: `internal` and `none` become local. A variable with variability `parameter` becomes a parameter or,
     /// without start value, a calculated parameter; but an output stays an output. `fixed` of an output or local

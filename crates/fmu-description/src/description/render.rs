@@ -29,9 +29,9 @@ impl ModelDescription {
     /// same bits. Empty lists and flags that are false are absent. All text is escaped; characters that XML 1.0
     /// cannot hold (control characters) become U+FFFD.
     ///
-    /// Numbers must be finite: FMI has no infinity, and an importer would not accept its text.
-    /// [`ModelDescription::problems`] reports such numbers. If a description has no problems, the
-    /// result is valid by `fmi2ModelDescription.xsd` or `fmi3ModelDescription.xsd`.
+    /// Numbers must be finite: FMI has no infinity, and an importer would not accept a text for infinity.
+    /// [`ModelDescription::problems`] reports such numbers. If a description has no problems, the result is valid by
+    /// `fmi2ModelDescription.xsd` or `fmi3ModelDescription.xsd`.
     ///
     /// ```
     /// use fmu_description::ModelDescription;

@@ -128,10 +128,9 @@ impl ModelDescription {
     /// Returns the static rules of FMI 2.0.5, or of FMI 3.0.2, that this description breaks. Empty for FMI 1.0,
     /// which this crate only reads.
     ///
-    /// These are the rules on the file itself: identifiers and flags, texts, units, types, log categories, the
-    /// tables of causality, variability and initial, start values and limits, names, aliases, clocks, the lists of
-    /// `ModelStructure` with their dependencies, the default experiment. The behaviour of the
-    /// binary is not checked.
+    /// Covers the rules on the file itself: identifiers and flags, texts, units, types, log categories, the tables of
+    /// causality, variability and initial, start values and limits, names, aliases, clocks, the lists of
+    /// `ModelStructure` with their dependencies, the default experiment. The behaviour of the binary is not checked.
     ///
     /// Cost: linear in the size of the description.
     #[must_use]

@@ -18,8 +18,8 @@ pub struct ScalarVariable {
     /// `causality`; `local` if absent.
     pub causality: Causality,
     /// `variability`; if absent, the reader sets it by the standard: in FMI 1.0 and 2.0 `continuous`, in FMI 3.0
-    /// `fixed` for parameters, `continuous` for floating-point types and otherwise `discrete`. A type that is not
-    /// floating-point is never read as `continuous`: it is `fixed` for parameters and otherwise `discrete`.
+    /// `fixed` for parameters, `continuous` for floating-point types and otherwise `discrete`. Types that are not
+    /// floating-point are never read as `continuous`, but as `fixed` for parameters and otherwise `discrete`.
     pub variability: Variability,
     /// `initial`; if absent, the default of the table in section 2.2.7 (FMI 3.0.2: 2.4.7.5)
     /// applies.
@@ -46,12 +46,12 @@ pub struct ScalarVariable {
     /// `clocks` (FMI 3.0): 1-based indices of the clocks that determine when the variable changes.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<6, _, _>")]
     pub clocks: Vec<u32>,
-    /// Name of the variable of which this one is an alias (FMI 3.0 element `Alias`; attribute `alias` of
-    /// FMI 1.0). Both have the same value reference; an alias of FMI 3.0 has no start value of its own.
+    /// Name of the variable of which this one is an alias (FMI 3.0 element `Alias`; attribute `alias` of FMI 1.0).
+    /// Variable and alias have the same value reference; an alias of FMI 3.0 has no start value of its own.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<7, _, _>")]
     pub alias_of: Option<String>,
-    /// `alias` is `negatedAlias` (FMI 1.0): the value is that of `alias_of` with the opposite sign, for a Boolean the
-    /// opposite value. A String has the same value.
+    /// `alias` is `negatedAlias` (FMI 1.0): the value is the value of `alias_of` with the opposite sign, for a Boolean
+    /// the opposite value. A String has the same value.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<8, _, _>")]
     pub negated: bool,
 }
@@ -111,15 +111,15 @@ pub enum Dimension {
 /// Values of the elements of an array, in row-major order.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Elements {
-    /// Of a floating-point type.
+    /// Start values of a floating-point type.
     Real(Vec<f64>),
-    /// Of an integer type or an `Enumeration`.
+    /// Start values of an integer type or an `Enumeration`.
     Integer(Vec<i128>),
-    /// Of a `Boolean`.
+    /// Start values of a `Boolean`.
     Boolean(Vec<bool>),
-    /// Of a `String`.
+    /// Start values of a `String`.
     String(Vec<String>),
-    /// Of a `Binary`.
+    /// Start values of a `Binary`.
     Binary(Vec<Vec<u8>>),
 }
 
@@ -142,7 +142,7 @@ impl Elements {
         self.len() == 0
     }
 
-    /// Returns the start value of `kind`, `count` times; `None` if it has none.
+    /// Returns the start value of `kind`, `count` times; `None` without start value.
     pub(super) fn repeated(kind: &Kind, count: usize) -> Option<Self> {
         Some(match kind {
             Kind::Boolean(start) => Elements::Boolean(vec![(*start)?; count]),
@@ -218,8 +218,8 @@ fn elements(extents: &[u64]) -> usize {
 }
 
 impl ModelDescription {
-    /// Returns the extent that a [`Dimension::Variable`] refers to: the start value of the first variable with
-    /// that value reference. `None` if there is none, or if its start value is not an integer from 0.
+    /// Returns the extent that a [`Dimension::Variable`] refers to: the start value of the first variable with that
+    /// value reference. `None` without such a variable, or if its start value is not an integer from 0.
     #[must_use]
     pub fn extent(&self, reference: u32) -> Option<u64> {
         let variable =

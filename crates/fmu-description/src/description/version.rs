@@ -45,8 +45,8 @@ impl fmt::Display for Version {
 }
 
 impl ModelDescription {
-    /// Returns the version of FMI by the first character of `fmi_version`; [`Version::V2`] if it is
-    /// neither 1 nor 3, or if `fmi_version` is empty.
+    /// Returns the version of FMI by the first character of `fmi_version`; [`Version::V2`] if this character is neither
+    /// 1 nor 3, or if `fmi_version` is empty.
     #[must_use]
     pub fn version(&self) -> Version {
         match self.fmi_version.bytes().next() {

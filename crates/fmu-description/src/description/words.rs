@@ -62,8 +62,7 @@ spelt! {
         Constant = "constant",
         /// Fixed after initialization.
         Fixed = "fixed",
-        /// Constant between events and between communication points; the importer's environment may change it
-        /// there.
+        /// Constant between events and between communication points, where the importer's environment may change it.
         Tunable = "tunable",
         /// Changes at events or communication points only.
         Discrete = "discrete",

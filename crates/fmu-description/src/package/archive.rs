@@ -32,7 +32,7 @@ const BUFFER: usize = 1 << 20;
 
 /// The reason for refusing an archive with two entries of the same name.
 const DUPLICATE: &str = "two entries have the same name";
-/// The reason for refusing an archive whose entries share bytes, as those of a ZIP bomb do.
+/// The reason for refusing an archive whose entries share bytes, as the entries of a ZIP bomb do.
 const OVERLAP: &str = "entries overlap";
 
 /// A reader that fails after `left` bytes.
@@ -58,12 +58,12 @@ impl<R: Seek> Seek for Metered<R> {
     }
 }
 
-/// Entries whose names were normalised.
+/// Entries whose names were normalised, for a warning.
 struct Renamed {
     count: usize,
-    /// The first of these names, as stated in the archive.
+    /// The first changed name, as stated in the archive.
     stated: String,
-    /// The same name after normalisation; empty for the root folder.
+    /// The first changed name after normalisation; empty for the root folder.
     read: String,
 }
 

@@ -28,8 +28,7 @@ pub struct Unpacked {
     pub description: ModelDescription,
     /// The defects of `modelDescription.xml` that were tolerated.
     pub warnings: Vec<Warning>,
-    /// The defects of the archive, its terminals and the names of its libraries that were tolerated, a sentence
-    /// each.
+    /// The tolerated defects of the archive, its terminals and the names of its libraries, a sentence each.
     pub archive_warnings: Vec<String>,
 }
 
@@ -44,18 +43,19 @@ impl Unpacked {
     ///
     /// # Errors
     ///
-    /// [`PackageError`] if the file is no ZIP archive, or has no readable `modelDescription.xml` at its root; if a
-    /// path leads out of the folder, has control characters, more than 1024 bytes or more than 64 levels; if there
-    /// are links, overlapping or encrypted entries, a file and a folder of one name, or names that differ only in
+    /// [`PackageError`] if the file is no ZIP archive, or has no readable `modelDescription.xml` at its root; if a path
+    /// leads out of the folder, has control characters, more than 1024 bytes or more than 64 levels; if there are
+    /// links, overlapping or encrypted entries, a file and a folder of one name, or names that differ only in
     /// backslashes and parts `.`; or if a needed entry has a compression other than deflate. Also, unless
-    /// [`crate::limits`] are lifted, if it has more than 100,000 entries, more than 32 MiB in its list of entries, or
-    /// more unpacked bytes than 4 GiB or than 64 MiB plus 100 times its own size. Names, kinds, stated sizes and
-    /// positions are checked before anything is written, the compression of an entry before that entry is written.
+    /// [`crate::limits`] are lifted, if the archive has more than 100,000 entries, more than 32 MiB in its list of
+    /// entries, or more unpacked bytes than 4 GiB or than 64 MiB plus 100 times its own size. Names, kinds, stated
+    /// sizes and positions are checked before anything is written, the compression of an entry before that entry is
+    /// written.
     pub fn open(path: &Path) -> Result<Self, PackageError> {
         Self::unpack(path, is_needed)
     }
 
-    /// Unpacks the FMU as [`Unpacked::open`] does, but all files: to pack them again, or to check them.
+    /// Unpacks the FMU as [`Unpacked::open`] does, but all files, so that they can be packed again or checked.
     ///
     /// # Errors
     ///
@@ -154,7 +154,7 @@ impl Unpacked {
     ///
     /// # Errors
     ///
-    /// [`PackageError::Missing`] if these folders have no library, or several with other names. It lists the
+    /// [`PackageError::Missing`] if these folders have no library, or several with other names. The error lists the
     /// libraries of the FMU for all platforms.
     pub fn library(&self, model_identifier: &str) -> Result<PathBuf, PackageError> {
         let name = format!("{model_identifier}{}", std::env::consts::DLL_SUFFIX);
@@ -246,12 +246,12 @@ impl Unpacked {
     }
 }
 
-/// The paths of the files and folders in `folder`; none if it cannot be read.
+/// The paths of the files and folders in `folder`; none if `folder` cannot be read.
 fn below(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
 }
 
-/// Whether `folder` has a file, at any depth; a link counts as one. False if it cannot be read.
+/// Whether `folder` has a file, at any depth; a link counts as one. False if `folder` cannot be read.
 fn has_file(folder: &Path) -> bool {
     below(folder).any(|path| path.is_symlink() || !path.is_dir() || has_file(&path))
 }

@@ -1,4 +1,4 @@
-//! Temporary folders. On Unix, if a process is killed, the next process that creates one removes its folders.
+//! Temporary folders. On Unix, if a process is killed, its folders are removed by the next process that creates one.
 
 use std::fs::File;
 use std::io::{self, ErrorKind};
@@ -7,9 +7,9 @@ use std::sync::{Mutex, Once, PoisonError, TryLockError};
 
 use tempfile::TempDir;
 
-/// Common prefix of the names of these folders.
+/// Common prefix of the names of temporary folders.
 const PREFIX: &str = "fmi2-unpacked-";
-/// Maximum number of attempts to create a folder, because another process may remove it before it is locked.
+/// Maximum number of attempts to create a folder, because another process may remove the folder before it is locked.
 const ATTEMPTS: usize = 10;
 
 /// The temporary folders of this process.
@@ -17,8 +17,8 @@ static FOLDERS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// A temporary folder, removed on drop.
 ///
-/// On Unix the folders of a killed process are removed too: the lock on a folder ends with its
-/// process, and the next process removes unlocked folders before it creates its first one.
+/// On Unix the folders of a killed process are removed too: the lock on a folder ends with the process that created the
+/// folder, and the next process removes unlocked folders before it creates its first one.
 #[derive(Debug)]
 pub struct TemporaryFolder {
     folder: TempDir,

@@ -39,7 +39,7 @@ pub struct Package {
 
 impl Package {
     /// Creates an FMU of FMI 2.0 that contains only `description_xml` as its `modelDescription.xml`: a text, or bytes
-    /// in the encoding that they declare.
+    /// in the encoding that the XML declares.
     #[must_use]
     pub fn new(description_xml: impl Into<Vec<u8>>) -> Self {
         Package { version: Version::V2, description: description_xml.into(), entries: Vec::new() }
@@ -157,7 +157,7 @@ impl Package {
     }
 }
 
-/// Returns the bytes of a ZIP archive with these entries, pairs of path and content, in this order: dated 1980-01-01,
+/// Returns the bytes of a ZIP archive with `entries`, pairs of path and content, in the given order: dated 1980-01-01,
 /// deflated unless `is_stored`, with mode 0644 (0755 in `binaries`), without directory entries, data descriptors and
 /// Zip64 records. Errors name `target`, the path of the archive.
 ///

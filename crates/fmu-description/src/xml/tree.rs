@@ -1,8 +1,8 @@
 //! Builds a tree of elements from the events of quick-xml, with limits on depth and size.
 //!
 //! roxmltree builds trees too, but refuses defects that are tolerated here: prefixes without declaration (such as
-//! `xsi:`), control characters, `--` in comments, undefined entities in text. It does not limit the depth, and its
-//! error for too many elements has no position.
+//! `xsi:`), control characters, `--` in comments, undefined entities in text. roxmltree does not limit the depth, and
+//! its error for too many elements has no position.
 
 use std::borrow::Cow;
 

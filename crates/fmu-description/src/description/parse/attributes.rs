@@ -1,4 +1,4 @@
-//! Typed access to attributes and children, with errors and warnings that name them.
+//! Typed access to attributes and children; errors and warnings name the attribute or child.
 
 use std::borrow::Cow;
 use std::ops::RangeInclusive;
@@ -281,8 +281,8 @@ impl<'a> Node<'a> {
         self.one_of(name, words)?.parse().ok()
     }
 
-    /// Reads one of `words`. Warns of another case, of white space around it, and of an unknown word, which is
-    /// missing.
+    /// Reads one of `words`. Warns of another case, of white space around the word, and of an unknown word, which
+    /// counts as missing.
     pub(super) fn one_of(&self, name: &str, words: &[&'static str]) -> Option<&'static str> {
         let text = self.attribute(name)?;
         let trimmed = text.trim_matches(WHITE_SPACE);

@@ -1,4 +1,4 @@
-//! Reads what several versions of FMI write in the same way: the attributes of the root element, units, log
+//! Reads the parts that several versions of FMI write in the same way: the attributes of the root element, units, log
 //! categories, the default experiment.
 
 use super::attributes::{Node, Result};
@@ -28,7 +28,7 @@ pub(super) fn general(root: Node<'_>, model_name: String) -> ModelDescription {
     }
 }
 
-/// Reads what the root elements of FMI 2.0 and 3.0 have in common; `model_name` as for [`general`].
+/// Reads the common part of the root elements of FMI 2.0 and 3.0; `model_name` as for [`general`].
 pub(super) fn common(root: Node<'_>, model_name: String) -> Result<ModelDescription> {
     // Read before the lists below, because only the first warnings are kept.
     let general = general(root, model_name);

@@ -101,7 +101,7 @@ fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unkno
     Ok(rows)
 }
 
-/// Reads `Derivatives`. Its rows determine the states, so an index that belongs to no variable is an error.
+/// Reads `Derivatives`. Its rows determine the states, so an index in them that belongs to no variable is an error.
 fn derivatives(element: Node<'_>, count: usize) -> Result<Vec<Unknown>> {
     if let Some(list) = element.optional_child("Derivatives")? {
         for row in list.children_named("Unknown") {

@@ -178,7 +178,7 @@ pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>> {
     }
 }
 
-/// Reads the type of a variable with its attributes and those of its declared type.
+/// Reads the type of a variable with its own attributes and the attributes of its declared type.
 pub(super) fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind> {
     let (declared_type, defaults) = declared(element, types).unzip();
     Ok(match element.element.name {
@@ -212,8 +212,8 @@ fn derivative(element: Node<'_>, count: usize) -> Result<Option<u32>> {
     index.map(Some).ok_or_else(|| element.wrong("derivative", &indices(count), text))
 }
 
-/// Returns the name and the kind of the declared type; `None` if no type is declared or, with a warning, if it does
-/// not exist or is of another kind than the variable. Also warns of an Enumeration without declared type.
+/// Returns the name and the kind of the declared type; `None` if no type is declared or, with a warning, if this type
+/// does not exist or differs in kind from the variable. Also warns of an Enumeration without a type.
 pub(super) fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kind)> {
     const NAME: &str = "declaredType";
     let (kind, version) = (element.element.name, element.warnings.version);

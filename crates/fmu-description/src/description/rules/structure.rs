@@ -1,4 +1,4 @@
-//! Rules on `ModelStructure` of FMI 2.0 (section 2.2.8), some of which FMI 3.0 has too.
+//! Rules on `ModelStructure` of FMI 2.0 (section 2.2.8), some of which also apply to FMI 3.0.
 
 use std::collections::{BTreeSet, HashSet};
 

@@ -69,8 +69,8 @@ fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Scalar
     })
 }
 
-/// Sets `alias_of` and `negated` by the attribute `alias`. Warns of an alias whose value reference no other variable
-/// of its base type has, and ignores its attribute.
+/// Sets `alias_of` and `negated` by the attribute `alias`. Warns of an alias whose value reference no other variable of
+/// its base type has, and ignores the attribute `alias`.
 fn set_aliases(elements: &[Node<'_>], variables: &mut [ScalarVariable]) {
     const NAME: &str = "alias";
     let stated: Vec<_> = elements

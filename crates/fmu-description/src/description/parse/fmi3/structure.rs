@@ -11,9 +11,9 @@ use crate::description::{ModelStructure, ScalarVariable, Unknown};
 
 /// Reads `ModelStructure` of `root` for `variables`.
 ///
-/// A row whose `dependencies` refer to no variable is read as depending on all knowns, and so is each output without
-/// a row. A row whose own value reference belongs to no variable is skipped; in `ContinuousStateDerivative` it is an
-/// error, because these rows determine the states.
+/// A row whose `dependencies` refer to no variable is read as depending on all knowns, as is each output without a row.
+/// A row whose own value reference belongs to no variable is skipped; in `ContinuousStateDerivative` such a row is an
+/// error, because the rows of this list determine the states.
 pub(super) fn read(
     root: Node<'_>,
     variables: &[ScalarVariable],
@@ -42,7 +42,7 @@ pub(super) fn read(
 }
 
 /// Returns rows for the outputs without a row, with their names. An output with the value reference of an earlier
-/// variable gets no row, because the value reference stands for the earlier one.
+/// variable gets no row, because the value reference stands for the earlier variable.
 fn missing<'a>(
     rows: &[Unknown],
     variables: &'a [ScalarVariable],

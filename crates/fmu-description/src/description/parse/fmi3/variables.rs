@@ -63,7 +63,8 @@ pub(super) fn read(
     Ok((variables, references))
 }
 
-/// Maps value references to indices, without aliases. Warns if several variables have one, and takes the first.
+/// Maps value references to indices, without aliases. If several variables share one, warns and takes the first
+/// variable.
 fn references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> References {
     let mut references = HashMap::with_capacity(variables.len());
     for ((index, variable), element) in (1..).zip(variables).zip(elements) {
@@ -136,7 +137,7 @@ fn alias(element: Node<'_>, variable: &ScalarVariable) -> Result<ScalarVariable>
     Ok(alias)
 }
 
-/// Returns the approximate number of bytes of the texts and lists of an alias, most of which it copies.
+/// Returns the approximate size in bytes of the texts and lists of an alias, mostly copies from its variable.
 fn copied_bytes(alias: &ScalarVariable) -> usize {
     let text = |attribute: &Option<String>| attribute.as_ref().map_or(0, String::len);
     let kind = match &alias.kind {
@@ -239,8 +240,8 @@ fn check_dimensions(
     Ok(())
 }
 
-/// Replaces value references by indices. A value reference that belongs to no variable is an error; in `previous` it
-/// gives a warning and counts as missing.
+/// Replaces value references by indices. A value reference that belongs to no variable is an error; in `previous` such
+/// a reference gives a warning and counts as missing.
 fn resolve(
     element: Node<'_>,
     variable: &mut ScalarVariable,

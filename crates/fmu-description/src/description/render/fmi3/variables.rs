@@ -8,8 +8,8 @@ use crate::description::{
 };
 
 impl Output {
-    /// Writes each variable that is no alias, with its aliases inside: the variables that name it in `alias_of`, at any
-    /// position. An alias of an unknown variable or of another alias is not written.
+    /// Writes each variable that is no alias, with its aliases inside, which are the variables with its name in
+    /// `alias_of`, at any position. An alias of an unknown variable or of another alias is not written.
     pub(in crate::description::render) fn variables_3(&mut self, description: &ModelDescription) {
         let mut aliases = std::collections::HashMap::<&str, Vec<&ScalarVariable>>::new();
         for alias in &description.variables {

@@ -38,7 +38,7 @@ pub(super) fn check(problems: &mut Problems<'_>) {
     }
 }
 
-/// Returns the extent of a dimension of the variable `name`. Adds a problem if it is 0, or if there is none.
+/// Returns the extent of a dimension of the variable `name`. Adds a problem for an extent of 0, or without an extent.
 fn extent(
     name: &str,
     dimension: &Dimension,

@@ -82,7 +82,7 @@ fn check_interval(variable: &ScalarVariable, clock: &ClockType, problems: &mut P
     demand(counted || clock.shift_counter.is_none(), "shiftCounter needs intervalCounter");
 }
 
-/// Checks the attribute `clocks`: it refers to clocks, and only a discrete or tunable variable has it.
+/// Checks the attribute `clocks`: the references are clocks, and only a discrete or tunable variable has the attribute.
 fn check_clocks(variable: &ScalarVariable, problems: &mut Problems<'_>) {
     let description = problems.description;
     let name = &variable.name;

@@ -149,8 +149,8 @@ fn check_derivative(variable: &ScalarVariable, problems: &mut Problems<'_>) {
     });
 }
 
-/// Checks that only aliases share a value reference, and that each names a variable with its value reference and
-/// type.
+/// Checks that only aliases share a value reference, and that each alias names a variable with the value reference and
+/// type of the alias.
 fn check_references(problems: &mut Problems<'_>) {
     let description = problems.description;
     let mut variables: HashMap<u32, &ScalarVariable> = HashMap::new();
