@@ -75,8 +75,8 @@ pub(crate) struct Attributes {
 }
 
 impl Attributes {
-    /// Reads all attributes `#[fmu(...)]` of the field; `None` if it has none. An error for the first attribute that is
-    /// unknown, repeated, malformed or a second role.
+    /// Reads all attributes `#[fmu(...)]` of the field; `None` for a field without such attributes. An error for the
+    /// first attribute that is unknown, repeated, malformed or a second role.
     pub(crate) fn of(field: &Field) -> Result<Option<Self>> {
         let mut attributes = None;
         for attribute in field.attrs.iter().filter(|attribute| attribute.path().is_ident("fmu")) {

@@ -6,7 +6,7 @@ use syn::{Error, Expr, ExprLit, ExprUnary, Ident, Lit, Result, UnOp};
 use crate::attributes::Role;
 use crate::field::{Base, Variable};
 
-/// Marks the states, and checks each variable alone and all together. The error has all mistakes, each at its place.
+/// Marks the states, and checks each variable alone and all together. The error has all mistakes, each with its span.
 pub(crate) fn check(variables: &mut [Variable<'_>]) -> Result<()> {
     let mut errors = Vec::new();
     errors.extend(mark_states(variables));
@@ -196,7 +196,7 @@ fn check_references(variables: &[Variable<'_>], variable: &Variable<'_>) -> Vec<
     errors
 }
 
-/// The place of the attribute `name`, or of the macro if it is not stated.
+/// The span of the attribute `name`, or of the macro if the attribute is not stated.
 fn span_of(variable: &Variable<'_>, name: &str) -> Span {
     let value = variable.attributes.values.iter().find(|(known, _)| known == name);
     value.map_or_else(Span::call_site, |(known, _)| known.span())

@@ -15,17 +15,17 @@ pub(crate) enum Base {
     Integer,
     Boolean,
     String,
-    /// A type that FMI 2.0 does not have, by the name of its constructor in `fmu::Variable`.
+    /// A type that FMI 2.0 lacks, by the name of the constructor of its variables in `fmu::Variable`.
     Typed(&'static str),
 }
 
 impl Base {
-    /// Whether it is `f64` or `f32`.
+    /// Whether the type is `f64` or `f32`.
     pub(crate) fn is_float(self) -> bool {
         matches!(self, Base::Real | Base::Typed("float32"))
     }
 
-    /// Whether it is a number of a type that FMI 2.0 does not have.
+    /// Whether the type is a number that FMI 2.0 does not have.
     pub(crate) fn is_fmi3_number(self) -> bool {
         matches!(self, Base::Typed(name) if name != "binary")
     }
@@ -67,8 +67,8 @@ pub(crate) enum Part<'a> {
     },
 }
 
-/// Reads a field. An error for one without name, with invalid attributes, without attribute unless its type is `Log`,
-/// or of a type that no variable has.
+/// Reads a field. An error for a field without name, with invalid attributes, without attribute unless its type is
+/// `Log`, or of a type that no variable has.
 pub(crate) fn read(field: &Field) -> Result<Part<'_>> {
     let Some(ident) = &field.ident else {
         return Err(Error::new(field.span(), "expected a field with a name"));

@@ -27,7 +27,7 @@ use syn::{DeriveInput, ItemImpl, parse_macro_input};
 /// | `String` | String |
 /// | `f32`, `i8`, `u8`, `i16`, `u16`, `u32`, `i64`, `u64` | the type of FMI 3.0 with that name, `Float32` to `UInt64`; not in FMI 2.0 |
 /// | `Vec<u8>` | Binary; not in FMI 2.0 |
-/// | `[f64; N]`, `[[f64; M]; N]` and other arrays of these | one variable for each element, `x[1]` or `A[1,2]`, row by row; of an array called `der(x)` they are `der(x[1])` and so on |
+/// | `[f64; N]`, `[[f64; M]; N]` and other arrays of these | one variable for each element, `x[1]` or `A[1,2]`, row by row; elements of an array `der(x)` are `der(x[1])` and so on |
 /// | `fmu::Log` | none: the messages of the model; at most one field, without the attribute |
 ///
 /// # The role
@@ -91,7 +91,7 @@ pub fn variables(input: TokenStream) -> TokenStream {
 
 /// Completes an implementation of `fmu::Model` for a struct with `#[derive(Variables)]`.
 ///
-/// It adds the items that the block does not have:
+/// The macro adds the items that the block does not have:
 ///
 /// | item | added |
 /// |---|---|

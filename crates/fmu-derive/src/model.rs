@@ -62,7 +62,7 @@ fn name(item: &ImplItem) -> Option<String> {
     }
 }
 
-/// All items that can be added, each with the first argument that it uses, if there is one.
+/// All items that can be added, each with the first argument that the item uses, if any.
 fn items(arguments: &Arguments) -> Vec<(ImplItem, Option<Ident>)> {
     let is_indicators = |(name, _): &&(Ident, Expr)| name == "event_indicators";
     let indicators = arguments.0.iter().find(is_indicators);

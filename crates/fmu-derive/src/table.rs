@@ -9,7 +9,7 @@ use crate::attributes::Role;
 use crate::check::{check, find};
 use crate::field::{Base, Part, Variable, read};
 
-/// The fields of a struct by their kinds.
+/// The fields of a model's struct by their kinds.
 struct Model<'a> {
     variables: Vec<Variable<'a>>,
     logs: Vec<&'a Ident>,

@@ -28,8 +28,8 @@ type Hook = Box<dyn Fn(&PanicHookInfo<'_>) + Send + Sync>;
 struct Fence {
     /// Depth of nested fences.
     depth: Cell<u32>,
-    /// The last panic inside a fence. It is never dropped with the thread: a destructor in thread-local storage would
-    /// keep the library loaded until the thread ends.
+    /// The last panic inside a fence. This value is never dropped with the thread: a destructor in thread-local storage
+    /// would keep the library loaded until the thread ends.
     last: Cell<ManuallyDrop<Option<Panic>>>,
 }
 
@@ -98,7 +98,7 @@ pub(crate) struct HookGuard(());
 
 /// Our installed hook and the previous one.
 struct Installed {
-    /// Address of our hook, to recognise it.
+    /// Address of the hook that this crate installed, to recognise whether other code has replaced it.
     address: usize,
     previous: Arc<Hook>,
 }

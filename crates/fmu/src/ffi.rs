@@ -30,8 +30,8 @@ use fmu_description::ModelDescription;
 use fmu_description::call_order::InterfaceType;
 use fmu_description::location::{NO_FOLDER, path_from_uri};
 
-/// Asks the importer to set the inputs at the middle and the end of the coming step of `fmi3DoStep`, if it uses
-/// intermediate update ([`Instance::begin_intermediate`]). During the callbacks `busy` is false, so that the
+/// Asks the importer to set the inputs at the middle and the end of the coming step of `fmi3DoStep`, if the importer
+/// uses intermediate update ([`Instance::begin_intermediate`]). During the callbacks `busy` is false, so that the
 /// importer can set inputs.
 unsafe fn ask_for_inputs<M: Model>(component: fmi2Component, start: f64, size: f64) {
     // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
@@ -119,7 +119,7 @@ unsafe fn borrow_output<'a, T>(pointer: *mut T, count: usize) -> Result<&'a mut 
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), count) })
 }
 
-/// Borrows the importer's FMU state pointer, which it has initialised (section 2.1.8).
+/// Borrows the importer's FMU state pointer, which the importer has initialised (section 2.1.8).
 unsafe fn borrow_state<'a>(pointer: *mut fmi2FMUstate) -> Result<&'a mut fmi2FMUstate, Failure> {
     if !pointer.is_aligned() {
         return Err(null_pointer("FMUstate"));
@@ -134,7 +134,7 @@ unsafe fn snapshot<'a, M: Model>(state: fmi2FMUstate) -> Result<&'a Snapshot<M>,
     unsafe { state.cast::<Snapshot<M>>().as_ref() }.ok_or_else(|| null_pointer("FMUstate"))
 }
 
-/// Overwrites the snapshot to which the FMU state in `place` points; allocates one if it is null.
+/// Overwrites the snapshot to which the FMU state in `place` points; allocates a snapshot if the state is null.
 unsafe fn store<M: Model>(place: &mut fmi2FMUstate, snapshot: Snapshot<M>) {
     // SAFETY: a state that is not null is a snapshot that this library made.
     if let Some(old) = unsafe { place.cast::<Snapshot<M>>().as_mut() } {
@@ -153,7 +153,7 @@ unsafe fn free_state<M: Model>(place: &mut fmi2FMUstate) {
     }
 }
 
-/// Copies a string; an error if it is null or no UTF-8.
+/// Copies a string; an error for null or invalid UTF-8.
 unsafe fn text(pointer: fmi2String, what: &str) -> Result<String, Failure> {
     if pointer.is_null() {
         return Err(null_pointer(what));
@@ -185,7 +185,7 @@ pub fn version<M: Model>() -> fmi2String {
     abi::VERSION.as_ptr()
 }
 
-/// Copies the path or URI of a folder; `None` if it is null or empty.
+/// Copies the path or URI of a folder; `None` for null or an empty text.
 unsafe fn folder(pointer: fmi2String, what: &str) -> Result<Option<String>, Failure> {
     if pointer.is_null() {
         return Ok(None);
@@ -194,8 +194,8 @@ unsafe fn folder(pointer: fmi2String, what: &str) -> Result<Option<String>, Fail
     Ok(Some(unsafe { text(pointer, what)? }).filter(|folder| !folder.is_empty()))
 }
 
-/// Returns the folder named by `fmuResourceLocation`; [`NO_FOLDER`] if it is null or empty, an error if it is no URI of
-/// a file.
+/// Returns the folder named by `fmuResourceLocation`; [`NO_FOLDER`] for null or an empty text, an error for a text that
+/// is no URI of a file.
 unsafe fn resources(location: fmi2String) -> Result<PathBuf, Failure> {
     // SAFETY: null or zero-terminated by the standard.
     match unsafe { folder(location, "fmuResourceLocation")? } {
@@ -284,7 +284,7 @@ pub unsafe fn free_instance<M: Model>(component: fmi2Component) {
     }
 }
 
-/// Renders a description. An error if it breaks rules of the standard.
+/// Renders a description. An error if the description breaks rules of the standard.
 fn render(description: &ModelDescription) -> Result<String, Failure> {
     let problems = description.problems();
     if problems.is_empty() {

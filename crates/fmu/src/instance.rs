@@ -43,11 +43,11 @@ pub(crate) struct Core<M: Model> {
     time: f64,
     /// Whether a value was set since the model last computed its outputs.
     stale: bool,
-    /// Whether [`Model::check`] has not passed yet, or a parameter was set since it last passed.
+    /// Whether the parameters still have to pass [`Model::check`]: at first, and after a parameter was set.
     unchecked: bool,
     /// Whether an input derivative is set for the next step.
     sloped: bool,
-    /// The time of the next event in s, if the last event stated it.
+    /// The time of the next event in s; `None` if the last event stated none.
     next_event: Option<f64>,
     /// Model exchange: the earliest time in s to which the importer may go back, and the time of the last
     /// completed integrator step.
@@ -74,12 +74,12 @@ pub(crate) struct Instance<M: Model> {
     categories: Option<Vec<String>>,
     /// The strings returned by the last `fmi2GetString`, which must stay valid until the next call.
     strings: Vec<std::ffi::CString>,
-    /// Buffer for `fmi2GetDirectionalDerivative`, created by its first call.
+    /// Buffer for `fmi2GetDirectionalDerivative`, created by the first call.
     direction: Option<M>,
     /// The additional part of an instance of FMI 3.0; `None` in FMI 2.0.
     session: Option<Box<Session>>,
-    /// [`Instance::lay_out`], in FMI 3.0 only. It is a pointer so that a program that makes no instance of FMI 3.0 does
-    /// not contain the function.
+    /// [`Instance::lay_out`], in FMI 3.0 only. A pointer, so that a program without instances of FMI 3.0 does not
+    /// contain the function.
     lay_out: Option<LayOut<M>>,
     hook_guard: HookGuard,
 }
@@ -110,7 +110,7 @@ impl<M: Model> Core<M> {
         }
     }
 
-    /// Calls [`Model::check`] if it has not passed yet, or if a parameter was set since it last passed.
+    /// Calls [`Model::check`] unless the model has passed it since a parameter was last set.
     #[inline]
     fn check(&mut self) -> Result<(), Failure> {
         if self.unchecked { self.check_model() } else { Ok(()) }
@@ -150,8 +150,8 @@ impl<M: Model> Instance<M> {
     }
 
     /// Makes the model and its interface inside the panic fence. Returns the instance with its model description.
-    /// `session` checks the importer's arguments and makes the part for FMI 3.0. It also runs inside the fence: if it
-    /// fails, the model is dropped, which may panic.
+    /// `session` checks the importer's arguments and makes the part for FMI 3.0. `session` also runs inside the fence,
+    /// because a failure of it drops the model, which may panic.
     fn build(
         make: impl FnOnce() -> Result<M, Failure>,
         callbacks: Callbacks,
@@ -240,8 +240,8 @@ impl<M: Model> Instance<M> {
         }
     }
 
-    /// Sends the messages of the model to the importer, the ones that are no warnings only if debug logging is on.
-    /// Returns whether one is a warning.
+    /// Sends the messages of the model to the importer, messages that are no warnings only if debug logging is on.
+    /// Returns whether one of them is a warning.
     #[cold]
     pub(crate) fn send_messages(&mut self) -> bool {
         let mut warned = false;
@@ -258,7 +258,7 @@ impl<M: Model> Instance<M> {
         warned
     }
 
-    /// Changes the state after a failure, logs it, and returns its status.
+    /// Changes the state after a failure, logs the failure, and returns its status.
     #[cold]
     fn fail<F: Function>(&mut self, function: F, failure: &Failure) -> Status {
         let (status, category) = match failure {
@@ -335,8 +335,8 @@ impl<M: Model> Instance<M> {
         }
     }
 
-    /// `fmi2SetupExperiment`. An error for a start time that is not finite, a stop time before it, and a tolerance that
-    /// is not finite and above zero.
+    /// `fmi2SetupExperiment`. An error for a start time that is not finite, a stop time before the start time, and a
+    /// tolerance that is not finite and above zero.
     pub(crate) fn setup_experiment(&mut self, experiment: Experiment) -> Result<(), Failure> {
         let Experiment { start_time, stop_time, tolerance } = experiment;
         if !start_time.is_finite() {
@@ -407,7 +407,8 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// Checks a communication step and the parameters. Returns the step from the present time, and the time of its end.
+    /// Checks a communication step and the parameters. Returns the step from the present time, and the end time of this
+    /// step.
     #[inline]
     fn begin_step(&mut self, start: f64, size: f64) -> Result<(Step, f64), Failure> {
         let core = &mut self.core;
@@ -456,7 +457,7 @@ impl<M: Model> Instance<M> {
     }
 }
 
-/// Checks that the GUID or token that the importer read in the description is the one of the library.
+/// Checks that the GUID or token that the importer read in the description is the one in the library.
 fn check_guid<M: Model>(
     guid_of_library: Guid,
     what: &str,

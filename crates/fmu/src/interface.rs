@@ -156,8 +156,8 @@ impl<M: Model> Interface<M> {
         Ok(())
     }
 
-    /// Assigns the next value reference of its type to the variable. Returns it with the type, whose start
-    /// value is the value of the field, unless the variable has `initial = calculated`.
+    /// Assigns the next value reference of its type to the variable. Returns the value reference and the type, whose
+    /// start value is the value of the field, unless the variable has `initial = calculated`.
     fn assign_reference(
         &mut self,
         model: &mut M,
@@ -382,7 +382,7 @@ impl<M> Interface<M> {
     }
 }
 
-/// Calls [`Model::new`]. If it fails, the message adds if the importer named no folder.
+/// Calls [`Model::new`]. If this fails and the importer named no folder, the message says so.
 pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Failure> {
     M::new(resources).map_err(|failure| {
         if resources != std::path::Path::new(NO_FOLDER) {

@@ -13,8 +13,8 @@ use fmu_description::call_order::Function;
 
 /// An instance for co-simulation in the same program, for platforms that cannot load a library.
 ///
-/// Each function works as the FMI 2.0 function of the same name in the FMU: checks, call order, panic fence and
-/// numbers are the same. It returns the status of FMI; [`Linked::take_messages`] returns the reasons.
+/// Each function works as the FMI 2.0 function of the same name in the FMU: checks, call order, panic fence and numbers
+/// are the same. Each function returns the status of FMI; [`Linked::take_messages`] returns the reasons.
 pub struct Linked<M: Model> {
     instance: Instance<M>,
     description: ModelDescription,
@@ -119,7 +119,7 @@ impl<M: Model> Linked<M> {
         status
     }
 
-    /// `fmi2SetFMUstate`: restores the state of `slot`; [`Status::Error`] if it is empty.
+    /// `fmi2SetFMUstate`: restores the state of `slot`; [`Status::Error`] for an empty slot.
     pub fn restore_state(&mut self, slot: usize) -> Status {
         let saved = self.saved.get(slot).and_then(Option::as_ref);
         self.instance.call(Function::SetFMUstate, |instance| match saved {

@@ -3,15 +3,15 @@
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// The largest number of messages of one call; further ones are dropped and counted.
+/// The largest number of messages of one call; further messages are dropped and counted.
 const LIMIT: usize = 1000;
 
 /// The messages of a model to the importer's logger.
 ///
-/// A model that logs has a field of this type, and [`Model::log`](crate::Model::log) returns it
-/// (`#[fmu::model]` does so). After each call the exporter sends the messages and empties the field, so it
-/// is not part of the FMU state: its serialised form is empty. A message that is repeated within a call is
-/// sent once; messages beyond 1000 in one call are only counted.
+/// A model that logs has a field of this type, and [`Model::log`](crate::Model::log) returns it (`#[fmu::model]` does
+/// so). After each call the exporter sends the messages and empties the field. The field is therefore not part of the
+/// FMU state: its serialised form is empty. A message that is repeated within a call is sent once; messages beyond 1000
+/// in one call are only counted.
 ///
 /// [`Model::update`](crate::Model::update) also runs at states that an integrator only tries; messages about
 /// what has happened belong to the other functions.
@@ -39,8 +39,8 @@ pub(crate) struct Message {
 }
 
 impl Log {
-    /// Logs a message of a `category`, one of [`Model::LOG_CATEGORIES`](crate::Model::LOG_CATEGORIES) or
-    /// `logEvents`. The importer receives it if debug logging is on for the category.
+    /// Logs a message of a `category`, one of [`Model::LOG_CATEGORIES`](crate::Model::LOG_CATEGORIES) or `logEvents`.
+    /// The importer receives the message if debug logging is on for the category.
     pub fn info(&mut self, category: &'static str, text: impl Into<String>) {
         self.add(Some(category), text.into());
     }
@@ -50,7 +50,7 @@ impl Log {
         self.add(None, text.into());
     }
 
-    /// Adds a message, unless the log has the same one.
+    /// Adds a message, unless the log already has an equal message.
     fn add(&mut self, category: Option<&'static str>, text: String) {
         let message = Message { category, text };
         if self.messages.contains(&message) {

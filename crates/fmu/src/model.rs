@@ -37,8 +37,8 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// `providesDirectionalDerivative`: whether the model implements [`Model::differentiate`].
     const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = false;
 
-    /// The log categories of the model's own messages, pairs of name and description, in addition to
-    /// those that every exported FMU has. See [`Log::info`].
+    /// The log categories of the model's own messages, pairs of name and description, in addition to the categories
+    /// that every exported FMU has. See [`Log::info`].
     const LOG_CATEGORIES: &'static [(&'static str, &'static str)] = &[];
 
     /// Returns the general part of the model description.
@@ -46,7 +46,7 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
 
     /// Creates the model as instantiated; its field values are the start values of the description.
     ///
-    /// `resources` is the FMU's `resources` folder. If the importer names none, it is a path at which
+    /// `resources` is the FMU's `resources` folder. If the importer names no folder, `resources` is a path at which
     /// nothing can be read, and the message of an error adds that `fmuResourceLocation` is missing.
     ///
     /// # Errors
@@ -72,10 +72,10 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
 
     /// Gives the arrays the extents that the structural parameters state ([`Variable::structural`]).
     ///
-    /// Called when the importer leaves configuration mode or reconfiguration mode (FMI 3.0.2, sections
-    /// 2.3.6 and 2.3.7). Afterwards [`Model::variables`] runs again; it must return the same arrays and
-    /// scalars in the same order, with the new number of elements. The values of the elements are those
-    /// that this function assigns, until the importer sets others. The default implementation does nothing.
+    /// Called when the importer leaves configuration mode or reconfiguration mode (FMI 3.0.2, sections 2.3.6 and
+    /// 2.3.7). Afterwards [`Model::variables`] runs again and must return the same arrays and scalars in the same
+    /// order, with the new number of elements. The elements have the values that this function assigns, until the
+    /// importer sets other values. The default implementation does nothing.
     ///
     /// # Errors
     ///
@@ -86,10 +86,9 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
 
     /// Computes states and outputs at the start time from parameters and inputs.
     ///
-    /// In initialization mode the importer may set and read values alternately, so this function may be
-    /// called several times and must not depend on the result of an earlier call. It must not change
-    /// variables with a start value ([`Variable::exact`]). The default implementation calls
-    /// [`Model::update`].
+    /// In initialization mode the importer may set and read values alternately, so this function may be called several
+    /// times and must not depend on the result of an earlier call. The function must not change variables with a start
+    /// value ([`Variable::exact`]). The default implementation calls [`Model::update`].
     ///
     /// # Errors
     ///
@@ -100,16 +99,14 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
 
     /// Advances the model from `step.start` to `step.end()` (co-simulation).
     ///
-    /// The default implementation returns [`Failure::Unsolved`]. The exporter then advances the model by
-    /// its equations, as an importer does in model exchange: it integrates the continuous states
-    /// ([`Variable::derivative_of`]) with the derivatives that [`Model::update`] computes, by the
-    /// [`Integrator`](crate::solver::Integrator) and with the importer's tolerance (default: the one of
-    /// [`About::default_experiment`], or 1e-6). It stops at state events
-    /// ([`Model::event_indicators`]), located to the resolution of time, and at time events
-    /// ([`Event::next_event_time`]). At each of them, and at the start of each communication step, it
-    /// calls [`Model::event`] until no new discrete states are needed. In between, inputs with derivatives
-    /// follow their polynomials. A model without states needs no step either: only its events happen,
-    /// and `update` runs at the end.
+    /// The default implementation returns [`Failure::Unsolved`]. The exporter then advances the model by its equations,
+    /// as an importer does in model exchange: it integrates the continuous states ([`Variable::derivative_of`]) with
+    /// the derivatives that [`Model::update`] computes, by the [`Integrator`](crate::solver::Integrator) and with the
+    /// importer's tolerance (default: the tolerance of [`About::default_experiment`], or 1e-6). The integration stops
+    /// at state events ([`Model::event_indicators`]), located to the resolution of time, and at time events
+    /// ([`Event::next_event_time`]). At each event, and at the start of each communication step, the exporter calls
+    /// [`Model::event`] until no new discrete states are needed. In between, inputs with derivatives follow their
+    /// polynomials. A model without states needs no step either: only its events happen, and `update` runs at the end.
     ///
     /// The longest step is 1e7 times the step size of the default experiment (1 s if it states none), and at most 1e7
     /// times the interval of each periodic clock; the exporter discards a longer one.
@@ -137,9 +134,9 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
         self.step(step).map(|()| None)
     }
 
-    /// Recomputes the outputs and the derivatives of the states from the present values of inputs,
-    /// parameters and, in model exchange, states and `time` (in s). It must not change variables that
-    /// change at events only. The default implementation does nothing.
+    /// Recomputes the outputs and the derivatives of the states from the present values of inputs, parameters and, in
+    /// model exchange, states and `time` (in s). The function must not change variables that change at events only. The
+    /// default implementation does nothing.
     ///
     /// # Errors
     ///
@@ -152,9 +149,9 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// Computes the directional derivative `dv_unknown = (dh/dv_known) dv_known` of
     /// `v_unknown = h(v_known)` (section 2.1.9) at the present values of the fields.
     ///
-    /// `direction` is a struct in which the field of each Real variable holds its component of the
-    /// direction: on entry `dv_known` in the fields of the knowns and zero in all others; on
-    /// return `dv_unknown` in the fields of the unknowns. Its other fields hold old values; ignore them.
+    /// `direction` is a struct in which the field of each Real variable holds its component of the direction: on entry
+    /// `dv_known` in the fields of the knowns and zero in all other fields; on return `dv_unknown` in the fields of the
+    /// unknowns. Other fields of `direction` hold old values; ignore these.
     ///
     /// * [`At::Initialization`]: the unknowns are the initial values of outputs, states and derivatives;
     ///   the knowns are inputs and variables with an exact start value.
@@ -191,10 +188,10 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// `fmi2NewDiscreteStates`: handles an event at `time` (in s), that is, recomputes the variables that
     /// change at events only. Called at least once before the first continuous-time mode.
     ///
-    /// Importers and the default [`Model::step`] may call it when nothing has happened, and several times at one
-    /// time. So it must decide from the values of the fields what to change. If there are clocked variables
-    /// ([`Variable::clocked_by`]), the exporter also calls it to read values while a clock ticks, and then restores
-    /// the model.
+    /// Importers and the default [`Model::step`] may call it when nothing has happened, and several times at one time.
+    /// The function must therefore decide from the values of the fields what to change. If there are clocked variables
+    /// ([`Variable::clocked_by`]), the exporter also calls the function to read values while a clock ticks, and then
+    /// restores the model.
     ///
     /// # Errors
     ///
@@ -204,8 +201,8 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
         Ok(Event::default())
     }
 
-    /// Sets the fields of the triggered clocks that tick in the event at `time` (in s), and that are no
-    /// inputs ([`Variable::triggered_clock`]). The fields are false before, and after the event.
+    /// Sets the fields of the triggered clocks that tick in the event at `time` (in s), and that are no inputs
+    /// ([`Variable::triggered_clock`]). The fields are false before and after the event.
     ///
     /// Called when event mode starts, when the importer has set its clocks, and when discrete states are
     /// updated again, each time before [`Model::event`]. The default implementation does nothing.
@@ -219,8 +216,8 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
         let _ = current;
     }
 
-    /// Returns the field with the messages of the model; `None` if it has none. The exporter sends them to
-    /// the importer after each call.
+    /// Returns the field with the messages of the model; `None` if the model has no messages. The exporter sends the
+    /// messages to the importer after each call.
     fn log(&mut self) -> Option<&mut Log> {
         None
     }
@@ -318,8 +315,8 @@ pub enum Failure {
         /// The reason.
         message: String,
     },
-    /// The model has no step of its own, or not for this step, and has not changed: the exporter
-    /// integrates its equations. Only [`Model::step`] and [`Model::step_to_event`] return it.
+    /// The model implements no step of its own, at all or for this step, and has not changed: the exporter integrates
+    /// its equations. Only [`Model::step`] and [`Model::step_to_event`] return this failure.
     #[error("the model has no step of its own; fmu::Simulation integrates its equations")]
     Unsolved,
     /// `fmi2Error`: the instance can only be read, reset, restored to a saved state, or freed.

@@ -15,7 +15,7 @@ pub(crate) fn filled<T: Copy>(room: &mut Room<T>, value: T) -> &mut [T] {
     unsafe { &mut *(std::ptr::from_mut(room) as *mut [T]) }
 }
 
-/// Views initialised values as memory for output values, to which its user must only write values.
+/// Views initialised values as memory for output values, to which the caller must only write values.
 pub(crate) fn room_of<T: Copy>(values: &mut [T]) -> &mut Room<T> {
     // SAFETY: the functions of the instance that take this only write values.
     unsafe { &mut *(std::ptr::from_mut(values) as *mut Room<T>) }

@@ -69,9 +69,9 @@ impl<M: Model> Simulation<M> {
     ///
     /// # Errors
     ///
-    /// The failures of [`Model::step`] or, if the model has no step of its own, of its equations; [`Failure::Discard`]
-    /// for a step that is too long ([`Model::step`] states how long it may be); in the first step the failures of
-    /// [`Simulation::start`].
+    /// The failures of [`Model::step`] or, if the model has no step of its own, the failures of its equations;
+    /// [`Failure::Discard`] for a step that is too long ([`Model::step`] states how long it may be); in the first step
+    /// the failures of [`Simulation::start`].
     pub fn step(&mut self, size: f64) -> Result<(), Failure> {
         if !self.is_started {
             self.start(Experiment::default())?;

@@ -8,8 +8,8 @@
 //! * [`Quartic`] estimates the first point at which a margin, the distance to an event, becomes negative; [`search`]
 //!   and [`locate`] find it.
 //!
-//! Method: Dormand-Prince of order 5(4). It suits systems that are not stiff; an importer integrates a
-//! stiff model better by model exchange.
+//! Method: Dormand-Prince of order 5(4). The method suits systems that are not stiff; an importer integrates a stiff
+//! model better by model exchange.
 //!
 //! ```
 //! use fmu::Failure;

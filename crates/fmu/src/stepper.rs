@@ -8,14 +8,14 @@ use fmu_description::DefaultExperiment;
 /// Most events in one communication step.
 const EVENT_LIMIT: u32 = 10_000;
 
-/// The longest communication step, divided by the step size of the default experiment. In a much longer one, a
-/// model that samples or integrates with shorter steps of its own would not return.
+/// The longest communication step, divided by the step size of the default experiment. In a much longer step, a model
+/// that samples or integrates with shorter steps of its own would not return.
 const LONGEST: f64 = 1e7;
 
 /// Most calls of [`Model::event`] at one event.
 const ITERATION_LIMIT: u32 = 1000;
 
-/// Where a step that stops at events ended.
+/// End of a step that stops at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stop {
     /// The time in s.
@@ -26,7 +26,7 @@ pub(crate) struct Stop {
 
 /// Integrates the continuous states of a model over communication steps.
 ///
-/// It has no memory between steps, so that the struct of the model remains the whole FMU state.
+/// The stepper has no memory between steps, so that the struct of the model remains the whole FMU state.
 pub(crate) struct Stepper {
     integrator: Integrator,
     /// The relative tolerance if the importer defines none.
@@ -56,14 +56,15 @@ impl Stepper {
         }
     }
 
-    /// Checks the size of a communication step in s, before the model sees it. [`Failure::Discard`] if it is too long.
+    /// Checks the size of a communication step in s, before the model sees it. [`Failure::Discard`] for a too long
+    /// step.
     #[inline]
     pub(crate) fn check_size(&self, size: f64) -> Result<(), Failure> {
         if size <= self.longest { Ok(()) } else { Err(too_long(size, self.longest)) }
     }
 
     /// Checks the delay from `next`, the announced time of an event, to `time`, at which it is handled, both in s. An
-    /// error if it exceeds the longest communication step: a model that samples might not return.
+    /// error if this delay exceeds the longest communication step: a model that samples might not return.
     pub(crate) fn check_delay(&self, next: f64, time: f64) -> Result<(), Failure> {
         if time - next <= self.longest {
             return Ok(());
@@ -72,9 +73,9 @@ impl Stepper {
         Err(Failure::Error(message))
     }
 
-    /// Advances the model over the step: handles the event at its start, and then integrates from event
-    /// to event. Inputs with derivatives follow their polynomials; after the step they have their values
-    /// at its start.
+    /// Advances the model over the step: handles the event at its start, and then integrates from event to event.
+    /// Inputs with derivatives follow their polynomials; after the step these inputs again have the values that they
+    /// had at its start.
     ///
     /// # Errors
     ///
@@ -93,7 +94,7 @@ impl Stepper {
     }
 
     /// Advances the model to the end of the step, to the first state event or to the event at `next` in s, whichever is
-    /// first. It handles no event, and does nothing if `next` is not after the start of the step. Has the errors of
+    /// first. Handles no event, and does nothing if `next` is not after the start of the step. Has the errors of
     /// [`Stepper::run`].
     pub(crate) fn run_to_event<M: Model>(
         &mut self,
@@ -219,8 +220,8 @@ impl<M: Model> Equations<'_, M> {
         self.model.update(time)
     }
 
-    /// Handles the event at `time`, until no new discrete states are needed, and returns the time of the next one, if
-    /// the model states it.
+    /// Handles the event at `time`, until no new discrete states are needed, and returns the time of the next event, if
+    /// the model states one.
     fn handle_event(&mut self, time: f64) -> Result<Option<f64>, Failure> {
         for _ in 0..ITERATION_LIMIT {
             let event = self.model.event(time)?;

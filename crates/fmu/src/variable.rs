@@ -70,7 +70,7 @@ pub(crate) struct Number {
     pub(crate) nominal: Option<f64>,
     /// Interval of a periodic clock in s.
     pub(crate) interval: Option<f64>,
-    /// How the model determines the intervals of a clock.
+    /// How the model determines the intervals; `None` unless the variable is a timed clock.
     pub(crate) interval_variability: Option<IntervalVariability>,
     /// The media type of a Binary.
     pub(crate) mime_type: Option<String>,
@@ -142,7 +142,7 @@ impl<M> Variable<M> {
     /// `name[1,2]` and so on; `der(x)` as `name` gives `der(x[1])`. `extents` are the extents of the
     /// dimensions, `field` borrows all elements.
     ///
-    /// FMI 2.0 has no arrays: each element is a variable there. In FMI 3.0 they are one array if the author
+    /// FMI 2.0 has no arrays: each element is a variable there. In FMI 3.0 the elements are one array if the author
     /// gives all of them the same attributes.
     ///
     /// ```
@@ -186,10 +186,10 @@ impl<M> Variable<M> {
         variable
     }
 
-    /// Creates a structural parameter: an extent of arrays ([`Variable::sized_by`]), at least 1, which the
-    /// importer may change in configuration mode (FMI 3.0.2, sections 2.3.6 and 2.4.4); if it is
-    /// [`tunable`](Variable::tunable), in reconfiguration mode as well. After that
-    /// [`Model::resize`](crate::Model::resize) runs. State the largest value with [`Variable::max`].
+    /// Creates a structural parameter: an extent of arrays ([`Variable::sized_by`]), at least 1, which the importer may
+    /// change in configuration mode (FMI 3.0.2, sections 2.3.6 and 2.4.4); a [`tunable`](Variable::tunable) one in
+    /// reconfiguration mode as well. After that [`Model::resize`](crate::Model::resize) runs. State the largest value
+    /// with [`Variable::max`].
     ///
     /// FMI 2.0 has no structural parameters: its description leaves them out, and the arrays have the extents that they
     /// have after [`Model::new`](crate::Model::new).
@@ -225,10 +225,10 @@ impl<M> Variable<M> {
     /// Creates an input clock whose intervals the model determines (FMI 3.0.2, section 2.2.8): `interval` is the field
     /// with an interval in s. In all other respects the clock is like a [`Variable::periodic_clock`].
     ///
-    /// * `Fixed` and `Tunable`: the clock is periodic, with an interval that depends on parameters; for `Tunable` they
+    /// * `Fixed` and `Tunable`: the clock is periodic, with an interval that depends on parameters; for `Tunable` these
     ///   may change during the run, and the next tick starts the new interval.
     /// * `Changing` and `Countdown`: [`Model::event`](crate::Model::event) sets the field to the time from now to the
-    ///   next tick. After the importer has read the field, it is infinite again. A `Changing` clock gets an
+    ///   next tick. After the importer has read the field, the field is infinite again. A `Changing` clock gets an
     ///   interval in [`Model::new`](crate::Model::new) and at each tick; a `Countdown` ticks once for each interval.
     pub fn timed_clock<F, G>(
         name: impl Into<String>,
@@ -251,8 +251,8 @@ impl<M> Variable<M> {
     /// [`input`](Variable::input) or an [`output`](Variable::output).
     ///
     /// The importer ticks an input clock in event mode: the field is true in the next call of
-    /// [`Model::event`](crate::Model::event), and false afterwards. [`Model::tick`](crate::Model::tick) sets the
-    /// field of another clock when it ticks. FMI 2.0 has no clocks: its description leaves them out.
+    /// [`Model::event`](crate::Model::event), and false afterwards. [`Model::tick`](crate::Model::tick) sets the field
+    /// of a clock that is no input when this clock ticks. FMI 2.0 has no clocks: its description leaves them out.
     pub fn triggered_clock<F>(
         name: impl Into<String>,
         description: impl Into<String>,
@@ -309,7 +309,7 @@ impl<M> Variable<M> {
         /// Sets the unit, an expression for [`Unit::parse`](fmu_description::unit::Unit::parse).
         unit(unit: impl Into<String>) number.unit = Some(unit.into());
         /// Sets the display unit, in which importers show the value: another unit of the same quantity, such as `degC`
-        /// for `K`. It is an expression for [`Unit::parse`](fmu_description::unit::Unit::parse), like the unit.
+        /// for `K`. The text is an expression for [`Unit::parse`](fmu_description::unit::Unit::parse), like the unit.
         display_unit(unit: impl Into<String>) number.display_unit = Some(unit.into());
         /// Makes a Real a difference, such as a rise of temperature, which has no offset in another unit: 5 K are shown
         /// as 5 degC (`relativeQuantity`).
@@ -334,8 +334,8 @@ impl<M> Variable<M> {
         derivative_of(state: impl Into<String>) derivative_of = Some(state.into());
         /// Sets `reinit`: an event may change this continuous state.
         reinit() reinit = true;
-        /// States the clocks of a discrete variable: it changes when one of them ticks (FMI 3.0.2, section
-        /// 2.2.8.3).
+        /// States the clocks of a discrete variable: the variable changes when one of these clocks ticks (FMI 3.0.2,
+        /// section 2.2.8.3).
         clocked_by(clocks: &[&str]) clocks = clocks.iter().map(|&name| name.to_owned()).collect();
         /// States the structural parameters that are the extents of the array with this element, one
         /// name for each dimension. All elements of the array state the same names.
@@ -412,8 +412,8 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Sets the inputs and variables with exact start values (or `time`) on which the initial value
-    /// depends. By default an importer must assume that it depends on all of them.
+    /// Sets the inputs and variables with exact start values (or `time`) on which the initial value depends. By default
+    /// an importer must assume that the initial value depends on all of them.
     #[must_use]
     pub fn initially<S: Into<String>>(mut self, names: impl IntoIterator<Item = S>) -> Self {
         self.declaration.initially = Some(names.into_iter().map(Into::into).collect());
@@ -423,9 +423,8 @@ impl<M> Variable<M> {
     /// Adds the field of the next time derivative: the first call adds the first derivative, the second
     /// call the second derivative, and so on.
     ///
-    /// For an input it is the field that `fmi2SetRealInputDerivatives` sets; the value holds at the start
-    /// of the step and is reset to zero after it. For an output it is the field that
-    /// `fmi2GetRealOutputDerivatives` reads.
+    /// For an input, `fmi2SetRealInputDerivatives` sets this field; the value holds at the start of the step and is
+    /// reset to zero after the step. For an output this is the field that `fmi2GetRealOutputDerivatives` reads.
     #[must_use]
     pub fn derivative<F>(mut self, field: F) -> Self
     where

@@ -8,7 +8,7 @@ use crate::variable::Variable;
 
 /// The table of variables of a struct, made by `#[derive(Variables)]`.
 ///
-/// [`#[fmu::model]`](macro@crate::model) completes the implementation of [`Model`](crate::Model) with it.
+/// [`#[fmu::model]`](macro@crate::model) completes the implementation of [`Model`](crate::Model) with this table.
 ///
 /// The page of the [crate] has an example.
 ///

@@ -141,9 +141,9 @@ macro_rules! export {
     };
 }
 
-/// Defines exported C functions from the types of their arguments. They call the generic functions for the model. A
-/// row has the exported name, the generic function, the types of its arguments, and the type of its result unless that
-/// is a status.
+/// Defines exported C functions from the types of their arguments. These functions call the generic functions for the
+/// model. A row has the exported name, the generic function, the types of its arguments, and the type of its result
+/// unless the result is a status.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! entry_points {
@@ -193,7 +193,7 @@ pub mod signature {
 
     /// An array of value references.
     pub type References = *const fmi3ValueReference;
-    /// `fmi3LogMessageCallback`, which may be null; likewise the other callbacks.
+    /// `fmi3LogMessageCallback`, which may be null, as the other callbacks may.
     pub type fmi3LogMessage = Option<fmi3LogMessageCallback>;
     /// `fmi3IntermediateUpdateCallback`.
     pub type fmi3IntermediateUpdate = Option<fmi3IntermediateUpdateCallback>;

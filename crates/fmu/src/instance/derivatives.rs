@@ -7,7 +7,7 @@ use crate::room::Room;
 use fmu_description::call_order::State;
 use fmu_description::{Causality, Initial, Variability};
 
-/// Whether the variable is a known: in initialization mode if `initializing`, otherwise after it.
+/// Whether the variable is a known: in initialization mode if `initializing`, otherwise after initialization mode.
 fn is_known<M>(slot: &Slot<M, f64>, initializing: bool) -> bool {
     if initializing {
         let exact = slot.initial == Some(Initial::Exact);

@@ -69,7 +69,7 @@ impl<M: Model> Instance<M> {
         self.core.stale = true;
     }
 
-    /// `fmi2SetTime`. In event mode it is allowed only for an FMU without continuous states (condition 8).
+    /// `fmi2SetTime`. In event mode this call is allowed only for an FMU without continuous states (condition 8).
     ///
     /// The importer may go back to the second last completed step, but not beyond an event (FMI 3.0.2, section 3.2.1).
     /// Integrators that interpolate, such as those of FMPy and fmusim, evaluate the model after `stopTime`; a

@@ -243,7 +243,7 @@ impl<M: Model> Instance<M> {
         self.located(kind, references, count, set)
     }
 
-    /// [`Instance::located`] for a function that reads. While a clock ticks, in a model with clocked variables, it
+    /// [`Instance::located`] for a function that reads. While a clock ticks, in a model with clocked variables, `body`
     /// reads the values after the event.
     pub(crate) fn read_located(
         &mut self,

@@ -17,9 +17,9 @@ pub(super) type Layout = [u8; 8];
 
 /// Computes the hash of the layout of `value`.
 ///
-/// It covers, in the order of serialisation, the names of structs, fields, enums and variants, the type of each number
-/// or text, the kind of each collection, and which elements, variants and options are present. It does not cover the
-/// values of numbers, texts and lengths. An error if the `Serialize` implementation of the value fails.
+/// The hash covers, in the order of serialisation, the names of structs, fields, enums and variants, the type of each
+/// number or text, the kind of each collection, and which elements, variants and options are present. The hash does not
+/// cover the values of numbers, texts and lengths. An error if the `Serialize` implementation of the value fails.
 pub(super) fn layout(value: &impl Serialize) -> Result<Layout, Refusal> {
     let mut hasher = LayoutHasher(0);
     value.serialize(&mut hasher)?;
@@ -53,9 +53,9 @@ const fn number(bytes: &[u8]) -> u64 {
 struct LayoutHasher(u64);
 
 impl LayoutHasher {
-    /// Adds a number to the hash by a bijection of the hash. So a difference between two hashes persists unless
-    /// a later difference cancels it (probability 2^-64). The factor is the odd number next to 2^64 divided by
-    /// the golden ratio.
+    /// Adds a number to the hash by a bijection of the hash. A difference between two hashes therefore persists unless
+    /// a later difference cancels the earlier one (probability 2^-64). The factor is the odd number next to 2^64
+    /// divided by the golden ratio.
     fn add(&mut self, number: u64) {
         let product = (self.0 ^ number).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         self.0 = product ^ (product >> 32);
@@ -197,7 +197,7 @@ impl ser::Serializer for &mut LayoutHasher {
         Ok(())
     }
 
-    /// Returns false, as the serialiser of postcard does, which writes the bytes.
+    /// Returns false, as the serialiser of postcard, which writes the bytes, does.
     fn is_human_readable(&self) -> bool {
         false
     }

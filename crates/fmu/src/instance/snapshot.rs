@@ -76,7 +76,7 @@ impl<M: Model> Snapshot<M> {
         core.map(|core| HEAD + core + CHECKSUM).map_err(|error| failed(&error))
     }
 
-    /// Writes the state to the first bytes of `room`; an error if it has too few.
+    /// Writes the state to the first bytes of `room`; an error if `room` has too few bytes.
     pub(crate) fn write(&self, room: &mut Room<u8>) -> Result<(), Failure> {
         let bytes = self.to_bytes()?;
         let (available, needed) = (room.len(), bytes.len());
@@ -89,7 +89,7 @@ impl<M: Model> Snapshot<M> {
         Ok(())
     }
 
-    /// Serialises the state: magic, GUID, layout, core in postcard's little-endian form, CRC-32 of all bytes before it.
+    /// Serialises the state: magic, GUID, layout, core in postcard's little-endian form, CRC-32 of all preceding bytes.
     pub(crate) fn to_bytes(&self) -> Result<Vec<u8>, Failure> {
         let layout = layout(&self.core).map_err(|error| failed(&error))?;
         let head = [MAGIC.as_slice(), &self.guid.0, &layout].concat();

@@ -12,7 +12,7 @@ pub(crate) use describe::describe;
 /// Marks the place of an event indicator.
 pub(crate) const INDICATOR: u32 = 1 << 31;
 
-/// Marks the place of an `Int64`, to tell it from that of an enumeration.
+/// Bit that marks the place of an `Int64`, to distinguish it from the place of an enumeration.
 pub(crate) const INT64: u32 = 1 << 31;
 
 /// A variable of FMI 3.0: a scalar or an array.
@@ -20,15 +20,15 @@ pub(crate) const INT64: u32 = 1 << 31;
 pub(crate) struct Entry {
     pub(crate) name: String,
     pub(crate) kind: NativeType,
-    /// The place of the first element; the places of the others follow.
+    /// The place ([`Table`]) of the first element; the places of further elements follow.
     first: u32,
     /// Number of elements.
     count: u32,
-    /// Whether the variable has the value of another variable and no start value: it must not be set.
+    /// Whether the variable must not be set: its value is that of another variable, and it has no start value.
     is_calculated: bool,
 }
 
-/// The variables by value reference of FMI 3.0, and what they depend on.
+/// The variables by value reference of FMI 3.0, and their dependencies.
 ///
 /// Each scalar has a place: its value reference of FMI 2.0, with a mark for an `Int64`, or the number of an event
 /// indicator, with a mark.
@@ -36,14 +36,15 @@ pub(crate) struct Table {
     entries: Vec<Entry>,
     /// `ModelStructure` of FMI 2.0, in which each element of an array is a variable.
     scalars: ModelStructure,
-    /// Value reference and element (from 1; 0 for a scalar) of each variable of FMI 2.0, in their order.
+    /// Value reference and element (from 1; 0 for a scalar) of each variable of FMI 2.0, in the order of these
+    /// variables.
     elements: Vec<(u32, usize)>,
     /// 1-based indices in FMI 2.0 of the parameters, on which outputs and derivatives may depend.
     parameters: Vec<u32>,
     /// 1-based indices in FMI 2.0 of the continuous states and of their aliases, which depend on no
     /// parameter.
     states: Vec<u32>,
-    /// 1-based indices in FMI 2.0 of the knowns in initialization mode and after it.
+    /// 1-based indices in FMI 2.0 of the knowns in initialization mode and after initialization mode.
     knowns: [Vec<u32>; 2],
 }
 
@@ -66,7 +67,7 @@ impl Table {
         })
     }
 
-    /// Whether the variables have the same names and types as those of `other`, in the same order.
+    /// Whether the variables have the same names and types as the variables of `other`, in the same order.
     pub(crate) fn has_variables_of(&self, other: &Self) -> bool {
         let variables = |table: &Self| -> Vec<(String, NativeType)> {
             table.entries.iter().map(|entry| (entry.name.clone(), entry.kind)).collect()
@@ -168,7 +169,7 @@ impl Table {
     }
 
     /// Returns the dependencies of a variable, or of its initial value if `initial`. There are none for a variable that
-    /// is no unknown. An output or a derivative that is neither a state nor an alias of one also depends on all
+    /// is no unknown. An output or a derivative that is neither a state nor an alias of a state also depends on all
     /// parameters. An event indicator depends on all knowns; its initial value is no unknown. An error for an unknown
     /// value reference.
     pub(crate) fn dependencies(

@@ -15,8 +15,8 @@ const CATEGORIES: [(&str, &str); 4] = [
 /// The category of the warnings of a model.
 pub(crate) const WARNING: &str = "logStatusWarning";
 
-/// Returns the log categories of an FMU: those of every FMU, the one of warnings if the model `logs`, and its own ones,
-/// `of_model`.
+/// Returns the log categories of an FMU: the categories of every FMU, the category of warnings if the model `logs`, and
+/// the model's own categories, `of_model`.
 pub(super) fn categories(logs: bool, of_model: &[(&str, &str)]) -> Vec<LogCategory> {
     let warning = logs.then_some((WARNING, "Calls that succeeded, with a warning of the model"));
     let category = |(name, description): (&str, &str)| LogCategory {

@@ -9,7 +9,7 @@ use fmu_description::{Causality, Dimension, Kind, ModelDescription, ScalarVariab
 /// The structural parameters of a model.
 #[derive(Default)]
 pub(super) struct Sizes {
-    /// The structural parameters that are the extents of an array, by the name of each of its elements.
+    /// For the name of each array element, the structural parameters that are the extents of the array.
     by_element: HashMap<String, Vec<String>>,
 }
 

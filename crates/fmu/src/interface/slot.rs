@@ -27,14 +27,14 @@ pub(crate) struct Slot<M, T> {
     pub(crate) items: Vec<i32>,
     /// The constant interval of a periodic clock in s.
     pub(crate) interval: Option<f64>,
-    /// How the model determines the intervals of a timed clock.
+    /// How the model determines the intervals; `None` unless the variable is a timed clock.
     pub(crate) interval_variability: Option<IntervalVariability>,
     pub(crate) field: Field<M, T>,
     /// The derivatives of a Real; the interval of a clock that the model determines.
     pub(crate) derivatives: Vec<Field<M, f64>>,
 }
 
-/// A slot without its field. The field determines the base type.
+/// A slot without its field, which determines the base type.
 pub(crate) struct SlotBuilder<M> {
     name: String,
     causality: Causality,

@@ -58,9 +58,9 @@ impl<M> Interface<M> {
         }
     }
 
-    /// Sets the derivatives of the inputs at the start of a step of `size` s: those of the parabola through their
-    /// values at its start, middle and end, or of the line from start to end for an input with one derivative. Returns
-    /// whether a derivative is not zero.
+    /// Sets the derivatives of the inputs at the start of a step of `size` s: the derivatives of the parabola through
+    /// the values at start, middle and end of the step, or of the line from start to end for an input with one
+    /// derivative. Returns whether a derivative is not zero.
     pub(crate) fn interpolate(
         &self,
         model: &mut M,
@@ -86,8 +86,8 @@ impl<M> Interface<M> {
         moves
     }
 
-    /// Sets the inputs with derivatives to their values `elapsed` s after they were `values`:
-    /// `u + u' t + u'' t^2 / 2 + ...`
+    /// Sets the inputs with derivatives to their values `elapsed` s after their values were `values`: `u + u' t + u''
+    /// t^2 / 2 + ...`
     pub(crate) fn extrapolate(&self, model: &mut M, values: &[f64], elapsed: f64) {
         for (&position, value) in self.interpolated.iter().zip(values) {
             let slot = &self.reals[position];

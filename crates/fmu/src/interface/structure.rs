@@ -9,8 +9,8 @@ pub(super) fn index(position: usize) -> u32 {
     u32::try_from(position + 2).unwrap_or(u32::MAX)
 }
 
-/// Returns the position of the variable called `name`, to which the variable `of` refers; an error, which names both,
-/// if there is none.
+/// Returns the position of the variable called `name`, to which the variable `of` refers; an error, which names both
+/// variables, if `name` does not exist.
 pub(super) fn find(variables: &[Declaration], of: &str, name: &str) -> Result<usize, Failure> {
     let position = variables.iter().position(|variable| variable.name == name);
     position.ok_or_else(|| {
@@ -91,7 +91,7 @@ fn dependency_row(
     Ok(self::row(index(position), row))
 }
 
-/// Returns the row of the variable with this index and these dependencies; it states no kinds if all of them are
+/// Returns the row of the variable with this index and these dependencies; the row states no kinds if all kinds are
 /// [`DependencyKind::Dependent`].
 pub(super) fn row(index: u32, dependencies: Vec<(u32, DependencyKind)>) -> Unknown {
     let (dependencies, kinds): (Vec<_>, Vec<_>) = dependencies.into_iter().unzip();

@@ -161,8 +161,8 @@ integers! {
     u64, UInt64, uint64;
 }
 
-/// Returns the attributes of an integer whose values are in the range `within`; a message for a limit that is no such
-/// value.
+/// Returns the attributes of an integer whose values are in the range `within`; a message for a limit outside this
+/// range or with a fraction.
 pub(super) fn integer(
     number: Number,
     within: &RangeInclusive<i128>,

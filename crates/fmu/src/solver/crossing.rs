@@ -120,16 +120,16 @@ impl Quartic {
 pub enum Crossing {
     /// The margin is negative or NaN at this length; at most `width` before it, it is not negative or the step starts.
     At(f64),
-    /// The longest length that was tried. The margin is negative at none of them; at this one it may be NaN.
+    /// The longest length that was tried. The margin is negative at no tried length; at the longest it may be NaN.
     NoneUpTo(f64),
 }
 
 /// Searches the first crossing of `margin`, a function of the length of a step. The search starts from an estimate:
 /// `fraction`, above 0, of the step of `length`.
 ///
-/// The estimate may be wrong: a margin may only touch zero, or change its sign by rounding. So the margin
-/// is evaluated at the estimate and at doubled lengths, up to the whole step. If it is negative at one of
-/// them, [`locate`] narrows the crossing to `width`.
+/// The estimate may be wrong: a margin may only touch zero, or change its sign by rounding. So the margin is evaluated
+/// at the estimate and at doubled lengths, up to the whole step. If the margin is negative at one of these lengths,
+/// [`locate`] narrows the crossing to `width`.
 pub fn search(
     fraction: f64,
     length: f64,
@@ -151,7 +151,7 @@ pub fn search(
 }
 
 /// Narrows a crossing of `margin`, which is `at_start >= 0` at 0 and negative at `ceiling`, a pair of length and
-/// margin. Returns the upper end of the last interval, where it is negative or NaN.
+/// margin. Returns the upper end of the last interval, where the margin is negative or NaN.
 ///
 /// Method: regula falsi with the Illinois rule, after 45 evaluations bisection, until the interval is at most `width`
 /// wide, or for 100 evaluations.

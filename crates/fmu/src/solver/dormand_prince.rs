@@ -58,7 +58,7 @@ impl<V: Vector> Step<V> {
         derivative(&self.start, &mut self.slopes[0]);
     }
 
-    /// Moves the start to the end of the step that was taken. The slope there is the last one of that step.
+    /// Moves the start to the end of the step that was taken. The new first slope is the last slope of that step.
     pub fn proceed(&mut self) {
         std::mem::swap(&mut self.start, &mut self.end);
         self.slopes.swap(0, 6);
@@ -67,8 +67,8 @@ impl<V: Vector> Step<V> {
 
     /// Integrates `y' = derivative(t, y)` from the start, at `t = time`, for `length`.
     ///
-    /// `derivative_at_end` is the same function; it computes the last slope, so that a caller can
-    /// remember its terms. Cost: six evaluations of the derivative, the last one at the end.
+    /// `derivative_at_end`, the same function, computes the last slope, so that a caller can remember its terms. Cost:
+    /// six evaluations of the derivative, the last one at the end.
     #[inline]
     pub fn take(
         &mut self,
@@ -173,8 +173,7 @@ impl<V: Vector> Step<V> {
 
     /// Component `i` of the continuous extension at the middle of the step, of order 4.
     ///
-    /// With the values and slopes at both ends it determines the whole extension, a polynomial
-    /// of degree 4.
+    /// This value and the values and slopes at both ends determine the whole extension, a polynomial of degree 4.
     #[inline]
     #[must_use]
     pub fn middle(&self, i: usize) -> f64 {

@@ -33,7 +33,7 @@ impl Indicators {
         }
     }
 
-    /// Makes the indicators at the end those at the start of the next step.
+    /// Makes the indicators at the end the indicators at the start of the next step.
     pub(super) fn proceed(&mut self) {
         self.samples.swap(0, 4);
     }
@@ -45,9 +45,9 @@ impl Indicators {
         self.samples.iter().find_map(of)
     }
 
-    /// The distance of the indicators `values` to an event: the smallest of them, each with the sign that
-    /// makes it positive before its event. An event has happened where it is negative. NaN if an indicator is NaN,
-    /// infinity without indicators.
+    /// The distance of the indicators `values` to an event: the smallest indicator, where each has the sign that makes
+    /// it positive before its event. An event has happened where it is negative. NaN if an indicator is NaN, infinity
+    /// without indicators.
     pub(super) fn margin(&self, values: &[f64]) -> f64 {
         let margins = values.iter().zip(&self.positive);
         margins.fold(f64::INFINITY, |least, (value, positive)| {

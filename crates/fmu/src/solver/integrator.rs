@@ -46,7 +46,7 @@ pub trait System {
     }
 }
 
-/// Where [`Integrator::advance`] stopped.
+/// The point at which [`Integrator::advance`] stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reached {
     /// At the requested end time.
@@ -78,8 +78,8 @@ pub struct Integrator {
 }
 
 impl Integrator {
-    /// Creates an integrator for as many states as there are `nominals`, their typical magnitudes, with
-    /// this number of event indicators.
+    /// Creates an integrator for as many states as there are `nominals`, their typical magnitudes, with `indicators`
+    /// event indicators.
     #[must_use]
     pub fn new(nominals: Vec<f64>, indicators: usize) -> Self {
         let zero = vec![0.0; nominals.len()];
@@ -96,8 +96,8 @@ impl Integrator {
         }
     }
 
-    /// Sets the relative tolerance; the default is 1e-6. A value outside of 1e-12 to 1e-2 is replaced by the nearest of
-    /// these.
+    /// Sets the relative tolerance; the default is 1e-6. A value outside of 1e-12 to 1e-2 is replaced by the nearer of
+    /// these limits.
     pub fn set_tolerance(&mut self, relative: f64) {
         self.tolerance = relative.clamp(1e-12, 1e-2);
     }
@@ -114,7 +114,7 @@ impl Integrator {
         self.step.start()
     }
 
-    /// Starts at the `state` at `time` in s: at first, and after each event or other discontinuity.
+    /// Starts at the `state` at `time` in s: before the first step, and after each event or other discontinuity.
     ///
     /// Forgets all earlier steps, so that equal states continue with equal bits. `end` is the time in s up to
     /// which the system is integrated next.
@@ -148,9 +148,8 @@ impl Integrator {
 
     /// Integrates to `end` in s, or to the first state event before it.
     ///
-    /// At an event the state is the one directly after the change of the sign, at most the resolution of
-    /// time later. Call [`Integrator::start`] before the next call of this function. Nothing is
-    /// allocated.
+    /// At an event the state is the state directly after the change of the sign, at most the resolution of time later.
+    /// Call [`Integrator::start`] before the next call of this function. Nothing is allocated.
     ///
     /// # Errors
     ///
@@ -254,8 +253,8 @@ impl Integrator {
 
     /// The length in s of the first step of an interval of `remaining` s.
     ///
-    /// The whole interval if the state changes by at most about 1 % in it. Otherwise it follows from the method of
-    /// Hairer, Norsett and Wanner, section II.4, which costs one evaluation.
+    /// The whole interval if the state changes by at most about 1 % in it. Otherwise the length follows from the method
+    /// of Hairer, Norsett and Wanner, section II.4, which costs one evaluation.
     fn first_length(
         &mut self,
         system: &mut (impl System + ?Sized),
@@ -355,7 +354,7 @@ impl Integrator {
     }
 }
 
-/// The length of the next step divided by that of a step with this scaled error.
+/// Factor from the length of a step with the scaled error `error` to the length of the next step.
 fn growth(error: f64) -> f64 {
     if error.is_finite() { (0.9 * libm::pow(error, -0.2)).clamp(0.2, 5.0) } else { 0.1 }
 }

@@ -59,7 +59,7 @@ impl Declaration {
         }
     }
 
-    /// Whether descriptions of FMI 2.0 leave the variable out; for an alias, its variable decides.
+    /// Whether descriptions of FMI 2.0 leave the variable out; an alias is left out with its variable.
     pub(crate) fn is_left_out_of_2(&self) -> bool {
         self.causality == Causality::StructuralParameter || matches!(self.base, Base::Clock)
     }

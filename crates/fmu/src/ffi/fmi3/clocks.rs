@@ -1,5 +1,5 @@
-//! The functions for clocks. The model determines the intervals, in seconds. So functions that set intervals or shifts,
-//! or get them as fractions, return an error for every clock.
+//! The functions for clocks. The model determines the intervals, in seconds. Therefore functions that set intervals or
+//! shifts, or get intervals as fractions, return an error for every clock.
 
 use super::super::{borrow_output, read};
 use super::entry_points_3;

@@ -1,4 +1,4 @@
-//! Clocks: which of them tick in an event, and their intervals (section 2.2.8).
+//! Clocks: the ones that tick in an event, and their intervals (section 2.2.8).
 
 use super::super::Instance;
 use crate::interface::{Native, Slot};
@@ -30,8 +30,8 @@ impl<M: Model> Instance<M> {
     }
 
     /// Runs `read` on the values after the present event: handles the event, and restores the model afterwards. A
-    /// clocked variable has its new value while its clock ticks, and `fmi3UpdateDiscreteStates` keeps it (section
-    /// 2.2.8.3).
+    /// clocked variable has its new value while its clock ticks, and `fmi3UpdateDiscreteStates` keeps this value
+    /// (section 2.2.8.3).
     #[inline(never)]
     pub(super) fn at_tick(
         &mut self,
@@ -117,8 +117,8 @@ impl<M: Model> Instance<M> {
     }
 
     /// Returns the interval of a clock in s with its qualifier. The interval of a clock that is changing or a countdown
-    /// is `Changed` when it is read first, then `Unchanged` or `NotYetKnown`; that of any other timed clock is always
-    /// `Changed`. An error for a triggered clock.
+    /// is `Changed` at its first read, then `Unchanged` or `NotYetKnown`; the interval of any other timed clock is
+    /// always `Changed`. An error for a triggered clock.
     fn interval(&mut self, place: u32) -> Result<(f64, IntervalQualifier), Failure> {
         let clock = bool::slots(&self.interface.typed).get(place as usize);
         if let Some(interval) = clock.and_then(|clock| clock.interval) {

@@ -9,9 +9,9 @@ use fmu_description::NativeType;
 pub(crate) struct Jacobian<'a> {
     pub(crate) unknowns: &'a [u32],
     pub(crate) knowns: &'a [u32],
-    /// Number of elements of the unknowns, as the importer states it.
+    /// Number of elements of all unknowns, stated by the importer.
     pub(crate) unknown_count: usize,
-    /// Number of elements of the knowns, as the importer states it.
+    /// Number of elements of all knowns, stated by the importer.
     pub(crate) known_count: usize,
 }
 

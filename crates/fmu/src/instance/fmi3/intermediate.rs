@@ -1,7 +1,7 @@
 //! Intermediate update: the importer sets the inputs within a communication step (section 4.2.2).
 //!
-//! At the start of a step the instance asks for the inputs in the middle and at the end of the step. The
-//! model then follows the parabola through start, middle and end, as with the derivatives of FMI 2.0.
+//! At the start of a step the instance asks for the inputs in the middle and at the end of the step. The model then
+//! follows the parabola through start, middle and end, as with the input derivatives of FMI 2.0.
 
 use super::super::Instance;
 use super::Session;
@@ -78,8 +78,8 @@ impl<M: Model> Instance<M> {
     }
 
     /// Sets the inputs to their values at the end of the step, `elapsed` s after its start: to the recorded values if
-    /// the step `is_whole`, otherwise to those of the polynomials. Then clears their derivatives. Does nothing if the
-    /// importer was not asked for inputs.
+    /// the step `is_whole`, otherwise to the values of the polynomials. Then clears the input derivatives. Does nothing
+    /// if the importer was not asked for inputs.
     pub(super) fn leave_inputs(&mut self, elapsed: f64, is_whole: bool) {
         let Self { core, interface, session, .. } = self;
         let Some(intermediate) = intermediate(session) else { return };

@@ -18,8 +18,8 @@ impl<M: Model> Instance<M> {
     /// `fmi3DoStep`.
     ///
     /// If the importer handles events (`eventModeUsed`) and allows early return, the step ends at the first event
-    /// ([`Model::step_to_event`], or the integration by the exporter if the model has no step). It also ends where the
-    /// model ends the simulation.
+    /// ([`Model::step_to_event`], or the integration by the exporter if the model has no step). The step also ends
+    /// where the model ends the simulation.
     ///
     /// # Errors
     ///

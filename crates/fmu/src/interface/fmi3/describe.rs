@@ -15,7 +15,7 @@ use fmu_description::{
 struct Builder {
     variables: Vec<ScalarVariable>,
     entries: Vec<Entry>,
-    /// For each old variable: 1-based index of the new one and its element (from 1; 0 for a scalar).
+    /// For each old variable: 1-based index of the new variable and the element in it (from 1; 0 for a scalar).
     places: Vec<(u32, usize)>,
 }
 
@@ -198,7 +198,7 @@ impl Builder {
         self.places[old as usize - 1].0
     }
 
-    /// Replaces the old indices of states in derivatives, and of clocks, by the new ones.
+    /// Replaces the old indices of states in derivatives, and of clocks, by new indices.
     fn set_indices(&mut self) {
         for variable in &mut self.variables {
             for clock in &mut variable.clocks {
