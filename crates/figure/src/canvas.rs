@@ -150,8 +150,8 @@ fn escape(text: &str) -> String {
 ///
 /// # Errors
 ///
-/// [`FigureError::Pixels`] if `svg` is not an SVG, has no area or is too large, or if one of its texts is not
-/// plain: it contains elements, has several positions, or its position or size is not a number.
+/// [`FigureError::Pixels`] if `svg` is not an SVG, has no area or is too large, or if a text is not plain: the text
+/// contains elements, has several positions, or its position or size is not a number.
 pub fn rasterise(svg: &str) -> Result<Vec<u8>, FigureError> {
     let failed = |reason: &dyn std::fmt::Display| FigureError::Pixels(reason.to_string());
     let outlined = outline_texts(svg).map_err(|reason| failed(&reason))?;

@@ -23,7 +23,7 @@ pub const LINKED: &str =
     concat!(include_str!("interactive/zoom.js"), include_str!("interactive/linked.js"));
 /// The script that opens elements `details` for printing, and when a link leads into one.
 pub const FOLD: &str = include_str!("interactive/fold.js");
-/// How a reader uses linked plots.
+/// Instructions for the reader of linked plots.
 pub const USAGE: [&str; 3] = [
     "Mouse: drag along the axis to zoom all plots, up or down to zoom the vertical axis of one, or turn the wheel with \
      Shift; double-click to show all. A click puts a second cursor: the values at the cursor are then followed by \

@@ -3,7 +3,7 @@
 use super::canvas::{Anchor, Canvas, text_width};
 use super::{RIGHT, TEXT, TEXT_SIZE, WIDTH};
 
-/// An entry: a sample of the line and its label.
+/// An entry of the legend: a sample of the line and the label of the line.
 #[derive(Debug)]
 pub(super) struct Entry<'a> {
     pub(super) colour: &'static str,
@@ -47,7 +47,7 @@ fn places(entries: &[Entry<'_>], left: f64) -> Vec<Place> {
     entries.iter().map(place).collect()
 }
 
-/// Returns the label, shortened to `room` by an ellipsis in the middle: its start and end distinguish it best.
+/// Returns the label, shortened to `room` by an ellipsis in the middle: start and end distinguish a label best.
 fn shortened(label: &str, room: f64) -> String {
     let letters: Vec<char> = label.chars().collect();
     let fits = |count: usize| text_width(&"x".repeat(count), TEXT_SIZE) <= room;

@@ -69,7 +69,7 @@ pub struct Panel<'a> {
     pub y_cap: Option<f64>,
     /// The curves; later curves cover earlier ones.
     pub series: Vec<Series<'a>>,
-    /// Times marked by a vertical dashed line, each with its text in the legend. Times outside of the axis are skipped.
+    /// Times marked by a vertical dashed line, and their texts in the legend. Times outside of the axis are skipped.
     pub marks: Vec<(f64, &'a str)>,
     /// Height of the frame in SVG units; default: 168.
     pub frame_height: Option<f64>,
@@ -229,8 +229,8 @@ impl Panel<'_> {
         (4..=10).rev().map(axis).find(fits).unwrap_or_else(|| axis(3))
     }
 
-    /// Returns the vertical axis for the values in the range of `horizontal` and for the limits; `pixels` are the
-    /// page coordinates of its lowest and highest value.
+    /// Returns the vertical axis for the values in the range of `horizontal` and for the limits; `pixels` are the page
+    /// coordinates of the lowest and highest value of the axis.
     fn vertical(&self, horizontal: &Axis, pixels: (f64, f64)) -> Axis {
         let (start, end) = horizontal.range();
         let limit = self.limit.into_iter().flat_map(|(size, _)| [size, -size]);

@@ -10,7 +10,7 @@ use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
 /// Size of a text without `font-size`, in SVG units.
 const DEFAULT_SIZE: f32 = 16.0;
-/// Attributes of a `<text>` that its path does not need, because the outlines include them.
+/// Attributes of a `<text>` that its path does not need, because the outlines include their effect.
 const TEXT_ATTRIBUTES: [&str; 7] =
     ["x", "y", "text-anchor", "font-size", "font-family", "font-weight", "font-style"];
 
@@ -18,7 +18,7 @@ const TEXT_ATTRIBUTES: [&str; 7] =
 ///
 /// # Errors
 ///
-/// Returns the reason if `svg` is not XML, or if a text is not plain: it contains elements, has several
+/// Returns the reason if `svg` is not XML, or if a text is not plain: the text contains elements, has several
 /// positions, or its position or size is not a number.
 pub(super) fn outline_texts(svg: &str) -> Result<String, String> {
     let document = Document::parse(svg).map_err(|error| error.to_string())?;

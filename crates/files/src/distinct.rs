@@ -18,12 +18,12 @@ impl std::error::Error for OutputConflict {}
 /// Checks that no output is an input or another output. Each path comes with the option or argument
 /// that names it.
 ///
-/// Two paths count as the same file if they lead to one file, also by links, or if they differ in case only. An output
-/// that is a pipe or a device is not checked.
+/// Two paths are the same file if both lead to one file, also by links, or if they differ in case only. An output that
+/// is a pipe or a device is not checked.
 ///
 /// # Errors
 ///
-/// [`OutputConflict`] for the first output that is an input or an earlier output. It names both.
+/// [`OutputConflict`] for the first output that is an input or an earlier output. The error names both paths.
 pub fn check_distinct(
     inputs: &[(&str, &Path)],
     outputs: &[(&str, &Path)],

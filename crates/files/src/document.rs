@@ -59,7 +59,7 @@ impl PlaceError {
         &self.shown
     }
 
-    /// Returns the error with `cause` and a semicolon before its message.
+    /// Returns the error with `cause` and a semicolon in front of the message.
     #[must_use]
     pub fn after(mut self, cause: &str) -> Self {
         self.message = format!("{cause}; {}", self.message);
@@ -117,7 +117,7 @@ impl Source {
         })
     }
 
-    /// Returns an error that points at `place`: at its first line, or at the last line of the text if `place` is beyond
+    /// Returns an error that points at the first line of `place`, or at the last line of the text if `place` is beyond
     /// the text.
     ///
     /// # Panics

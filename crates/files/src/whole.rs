@@ -30,7 +30,7 @@ impl Pending {
     ///
     /// # Errors
     ///
-    /// [`io::Error`] if the file cannot be renamed; it is then removed.
+    /// [`io::Error`] if the file cannot be renamed; the temporary file is then removed.
     pub fn commit(self) -> io::Result<()> {
         fs::rename(&self.partial, &self.path)
     }
@@ -43,8 +43,8 @@ impl Drop for Pending {
     }
 }
 
-/// Writes `bytes` to `path` atomically: to a temporary file beside it, which is then renamed. Creates the folder if it
-/// is missing. Writes directly to a pipe or a device.
+/// Writes `bytes` to `path` atomically: to a temporary file beside `path`, which is then renamed. Creates the folder if
+/// it is missing. Writes directly to a pipe or a device.
 ///
 /// # Errors
 ///

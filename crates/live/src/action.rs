@@ -13,7 +13,7 @@ pub enum Action {
     Step,
     /// End the run.
     Stop,
-    /// Add these entries, in TOML, to the scenario.
+    /// Add the entries of this TOML text to the scenario of the run.
     Intervene(String),
 }
 

@@ -25,7 +25,7 @@ pub struct Facts {
     pub start: f64,
     /// Stop time in s.
     pub stop: f64,
-    /// The speed to which the run is paced, as a factor of real time; `None` if it is not paced.
+    /// The speed to which the run is paced, as a factor of real time; `None` for a run that is not paced.
     pub pace: Option<f64>,
     /// The signals, in the order of the values of a [`crate::Sample`].
     pub signals: Vec<Variable>,
@@ -33,7 +33,7 @@ pub struct Facts {
     pub settings: Vec<Variable>,
     /// The inputs on which a fault can act.
     pub inputs: Vec<Source>,
-    /// The file that repeats the run with its interventions.
+    /// Name of the file that repeats the run with its interventions.
     pub file: String,
     /// The command that repeats the run from this file.
     pub repeat: String,
@@ -46,13 +46,13 @@ pub struct Variable {
     pub name: String,
     /// The unit; empty if the variable has none.
     pub unit: String,
-    /// The type, as in the model description: `Real`, `Boolean` and so on.
+    /// The type of the variable in the model description: `Real`, `Boolean` and so on.
     pub kind: String,
     /// The description; empty if the variable has none.
     pub description: String,
 }
 
-/// An input with its source.
+/// An input with the output that is connected to it.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Source {
     /// The input.

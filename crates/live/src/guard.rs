@@ -7,7 +7,7 @@ use crate::request::HttpRequest;
 /// Number of random bytes in a token.
 const BYTES: usize = 24;
 
-/// The random part of the address. A request without it is refused.
+/// The random part of the address. A request without this token is refused.
 pub(crate) struct Token(String);
 
 impl Token {
@@ -22,7 +22,7 @@ impl Token {
         &self.0
     }
 
-    /// Returns whether `other` equals the token, in a time that does not depend on where they differ.
+    /// Returns whether `other` equals the token, in a time that does not depend on where the two differ.
     pub(crate) fn is(&self, other: &str) -> bool {
         let (token, other) = (self.0.as_bytes(), other.as_bytes());
         let pairs = token.iter().zip(other);

@@ -43,7 +43,7 @@ struct Head {
     body_size: usize,
 }
 
-/// Reads a request until `deadline`. Refuses it if it is late, too large or not HTTP/1.1, or its body is not UTF-8.
+/// Reads a request until `deadline`. Refuses late, too large and other than HTTP/1.1 requests, and a body not in UTF-8.
 pub(crate) fn read(stream: &mut TcpStream, deadline: Instant) -> Result<HttpRequest, Refusal> {
     let mut bytes = Vec::new();
     let Head { mut request, size, body_size } = loop {
@@ -84,8 +84,8 @@ fn receive(stream: &mut TcpStream, deadline: Instant, bytes: &mut Vec<u8>) -> Re
     }
 }
 
-/// Parses the head of a request; `None` if it is not complete. Returns the status and the reason of a refusal if it is
-/// too large, ambiguous or not HTTP/1.1.
+/// Parses the head of a request; `None` if the head is not complete. Returns the status and the reason of a refusal if
+/// the head is too large, ambiguous or not HTTP/1.1.
 fn parse_head(bytes: &[u8]) -> Result<Option<Head>, (u16, &'static str)> {
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];
     let mut parser = httparse::Request::new(&mut headers);

@@ -17,8 +17,8 @@ use crate::store::{Query, SHOWN};
 
 /// Longest time to wait for an answer of the run, which may be in the middle of a step.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The content type of requests to the run. A page of another site can send it only after a preflight request of the
-/// browser, which this server refuses.
+/// The content type of requests to the run. A page of another site can send this type only after a preflight request of
+/// the browser, which this server refuses.
 const TOML: &str = "application/toml";
 
 const HTML: &str = include_str!("page/page.html");

@@ -27,7 +27,7 @@ const IDLE: Duration = Duration::from_millis(100);
 /// Shortest interval between samples, as a multiple of the wall-clock time that a sample costs the run.
 const COSTS: u32 = 50;
 
-/// Starts the threads. They end after the view is closed.
+/// Starts the threads of the server, which end after the view is closed.
 pub(crate) fn start(listener: TcpListener, site: Arc<Site>) -> io::Result<()> {
     let sampled = site.clone();
     thread::Builder::new()

@@ -20,7 +20,7 @@ const REQUEST: u8 = 2;
 pub enum Phase {
     /// The run steps.
     Running = 0,
-    /// The run waits at a communication point until it is resumed.
+    /// The run waits at a communication point for a request to resume.
     Paused = 1,
     /// The run has ended.
     Ended = 2,

@@ -39,7 +39,7 @@ pub struct Sample {
 /// An event that the run sends to the server.
 pub(crate) enum Event {
     Sample(Sample),
-    /// A message; `fmu` is empty if it comes from no FMU.
+    /// A message; `fmu` is empty for a message of the run itself.
     Message {
         fmu: String,
         text: String,
@@ -53,7 +53,7 @@ pub(crate) enum Event {
     },
 }
 
-/// A message with its FMU.
+/// A message with the name of its FMU.
 #[derive(Clone, Serialize)]
 struct Message {
     fmu: String,

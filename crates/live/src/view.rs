@@ -127,7 +127,7 @@ impl View {
         self.shared.set_sample_duration(cost);
     }
 
-    /// Publishes an intervention at `time` in s. It is dropped and counted if the server cannot take it at once.
+    /// Publishes an intervention at `time` in s, which is dropped and counted if the server cannot take it at once.
     pub fn intervened(&self, time: f64, text: String) {
         self.messages.publish(Event::Intervention { time, text });
     }

@@ -10,15 +10,15 @@ use crate::{CallError, EventInfo};
 #[expect(clippy::missing_errors_doc, reason = "CallError as for every function of Slave")]
 pub trait Events {
     /// Returns the time in s of the next event that is known before it happens: a time event, or the tick of an input
-    /// clock; `None` if there is none.
+    /// clock; `None` without such an event.
     fn next_event(&mut self) -> Result<Option<f64>, CallError>;
 
     /// `fmi3EnterEventMode`, `fmi2EnterEventMode` at the time reached; input clocks that are due tick. If the slave is
     /// already in event mode, the clocks tick without a change of mode.
     fn enter_event_mode(&mut self) -> Result<(), CallError>;
 
-    /// `fmi3UpdateDiscreteStates`, `fmi2NewDiscreteStates`: one iteration of an event. It ends the ticks of all
-    /// clocks. A clock to which it gives an interval of 0 s ticks again in the next iteration.
+    /// `fmi3UpdateDiscreteStates`, `fmi2NewDiscreteStates`: one iteration of an event. The iteration ends the ticks of
+    /// all clocks. A clock to which the iteration gives an interval of 0 s ticks again in the next iteration.
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError>;
 
     /// `fmi3EnterStepMode`, `fmi2EnterContinuousTimeMode`, after the last iteration of an event.

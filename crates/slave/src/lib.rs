@@ -45,8 +45,8 @@ pub trait Slave: Send {
     /// Only [`Slave::configure`] changes it.
     fn description(&self) -> &ModelDescription;
 
-    /// Whether the slave has no states: its outputs depend on the present inputs only. The Jacobi
-    /// method steps such a slave after all others, when its inputs are known.
+    /// Whether the slave has no states: its outputs depend on the present inputs only. The Jacobi method steps such a
+    /// slave after all others, when the inputs are known.
     fn is_function(&self) -> bool {
         false
     }
@@ -105,7 +105,7 @@ pub trait Slave: Send {
         Err(absent("fmi2SetInteger"))
     }
 
-    /// `fmi2GetBoolean`: 0 is false. In event mode a clock is true while it ticks. Otherwise it is true if it has
+    /// `fmi2GetBoolean`: 0 is false. In event mode a clock is true while it ticks. Otherwise a clock is true if it has
     /// ticked in the last step or at the end of that step.
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
         Err(absent("fmi2GetBoolean"))
@@ -178,7 +178,7 @@ pub trait Slave: Send {
         Err(absent("fmi2GetFMUstate"))
     }
 
-    /// `fmi2SetFMUstate`: restores the state saved in `slot`. The slot keeps it.
+    /// `fmi2SetFMUstate`: restores the state saved in `slot`. The slot keeps the state.
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
         Err(absent("fmi2SetFMUstate"))
     }
@@ -193,8 +193,8 @@ pub trait Slave: Send {
         Err(absent("fmi2DeSerializeFMUstate"))
     }
 
-    /// Sets Real inputs and their derivatives, makes the step, and reads Real outputs and their derivatives, also
-    /// after a partial step. One function, so that a slave in another process receives one request.
+    /// Sets Real inputs and their derivatives, makes the step, and reads Real outputs and their derivatives, also after
+    /// a partial step. All in one function, so that a slave in another process receives one request.
     fn advance(&mut self, request: &mut StepRequest<'_>) -> Result<StepResult, CallError> {
         if !request.inputs.is_empty() {
             self.set_real(request.inputs, request.input_values)?;
@@ -239,7 +239,7 @@ pub trait Slave: Send {
     ///
     /// * is in event mode after [`Slave::exit_initialization_mode`],
     /// * ends a step with [`StepResult::Event`] if an event happens at the end of the step, or, with `stop`, at the
-    ///   first event. Without `stop` it handles earlier events itself.
+    ///   first event. Without `stop` the slave handles earlier events itself.
     fn hand_over_events(&mut self, stop: bool) -> Result<bool, CallError> {
         Ok(false)
     }
@@ -256,8 +256,8 @@ pub trait Slave: Send {
         false
     }
 
-    /// From now on passes copies of arrays to the FMU, with canaries around them: a call fails if it writes past an
-    /// array or into a `const` array. Does nothing if the slave calls no C functions in this process.
+    /// From now on passes copies of arrays to the FMU, with canaries around them: a call fails if the FMU writes past
+    /// an array or into a `const` array. Does nothing if the slave calls no C functions in this process.
     fn guard_arrays(&mut self) {}
 
     /// Returns the settings of its process that the FMU has changed, one phrase each: environment, working directory,
@@ -266,8 +266,8 @@ pub trait Slave: Send {
         Ok(Vec::new())
     }
 
-    /// Whether a call has returned `fmi2Warning` since the last call of this function. False if this is unknown, as for
-    /// an instance in another process.
+    /// Whether a call has returned `fmi2Warning` since the last call of this function. False if unknown, as for an
+    /// instance in another process.
     fn take_warning(&mut self) -> bool {
         false
     }
@@ -333,7 +333,7 @@ pub struct StepRequest<'a> {
     pub inputs: &'a [u32],
     /// Values of `inputs`.
     pub input_values: &'a [f64],
-    /// Value references of the inputs whose derivatives are set.
+    /// Value references of the inputs whose derivatives are in `input_derivatives`.
     pub derived_inputs: &'a [u32],
     /// Orders of the derivatives of `derived_inputs`.
     pub input_orders: &'a [i32],
@@ -345,7 +345,7 @@ pub struct StepRequest<'a> {
     pub outputs: &'a [u32],
     /// Receives the values of `outputs`.
     pub output_values: &'a mut [f64],
-    /// Value references of the outputs whose derivatives are read.
+    /// Value references of the outputs whose derivatives are read into `output_derivatives`.
     pub derived_outputs: &'a [u32],
     /// Orders of the derivatives of `derived_outputs`.
     pub output_orders: &'a [i32],
@@ -402,9 +402,9 @@ pub enum StepResult {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{function} {}{}", self.failure_text(), joined(.messages))]
 pub struct CallError {
-    /// Name of the FMI function, or what failed in its place, such as an integration.
+    /// Name of the FMI function, or of the failed operation in its place, such as an integration.
     pub function: &'static str,
-    /// How the call failed.
+    /// Kind of the failure.
     pub failure: Failure,
     /// Messages that the FMU logged during the call.
     pub messages: Vec<String>,
@@ -449,7 +449,7 @@ impl CallError {
     }
 }
 
-/// How a call failed.
+/// Kind of the failure of a call.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Failure {

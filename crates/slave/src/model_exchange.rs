@@ -17,7 +17,7 @@ pub trait ModelExchange: Slave {
         Ok(self.description().structure.derivatives.len())
     }
 
-    /// Returns the number of event indicators: `numberOfEventIndicators` (0 if it is not stated), or
+    /// Returns the number of event indicators: `numberOfEventIndicators` (0 if not stated), or
     /// `fmi3GetNumberOfEventIndicators`. Call it after initialization mode.
     fn number_of_event_indicators(&mut self) -> Result<usize, CallError> {
         Ok(self.description().number_of_event_indicators.unwrap_or(0) as usize)
@@ -28,7 +28,7 @@ pub trait ModelExchange: Slave {
         true
     }
 
-    /// Starts a communication step: [`Slave::get_boolean`] forgets the ticks of clocks before it.
+    /// Starts a communication step: [`Slave::get_boolean`] forgets the ticks of clocks before this step.
     fn begin_communication_step(&mut self) {}
 
     /// `fmi2SetTime`: sets the time in s.

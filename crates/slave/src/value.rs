@@ -24,8 +24,8 @@ pub enum Value {
 }
 
 impl Value {
-    /// Reads `text` as a value of a variable of type `kind`; blanks around it are ignored, except in a String.
-    /// An Enumeration is any integer, or the name of an item of its type in `types`.
+    /// Reads `text` as a value of a variable of type `kind`; blanks around `text` are ignored, except in a String. An
+    /// Enumeration is any integer, or the name of an item of its type in `types`.
     ///
     /// # Errors
     ///
