@@ -1,4 +1,4 @@
-//! Tells the command its commit, and the clone that it is built in.
+//! Passes the hash of the commit, and the path of the clone, to the build of the command.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

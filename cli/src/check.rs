@@ -191,7 +191,7 @@ fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, V
     Ok(behaviour::check(&as_stepped(&unpacked.description), options.thorough, &mut make))
 }
 
-/// Returns the description; without co-simulation, the steps of scheduled execution take its place.
+/// Returns the description; without co-simulation, scheduled execution takes the place of co-simulation.
 fn as_stepped(description: &ModelDescription) -> ModelDescription {
     ModelDescription { co_simulation: description.stepped(), ..description.clone() }
 }

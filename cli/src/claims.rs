@@ -9,14 +9,14 @@ use serde::Serialize;
 pub(crate) const WATCHED: [&str; 5] =
     ["plant.x_p", "plant.theta", "plant.f_fric", "controller.f_hat", "plant.regime"];
 
-/// Time in s after the activation at which the measurement of the residual motion starts.
+/// Time in s from the start of the compensation to the start of the measurement of the residual motion.
 const SETTLING: f64 = 20.0;
 /// The limit cycle is measured in this last fraction of the time before the activation.
 const CYCLE: f64 = 0.75;
-/// Shortest slide in m that is counted: when the cart creeps to its rest, rounding makes it stick and slip.
+/// Shortest slide in m that counts: rounding makes a cart that creeps to its rest stick and slip in shorter slides.
 const SLIDE: f64 = 1e-3;
-/// Coulomb friction of the paper in N. An estimate follows the friction if the root mean square of its error is below
-/// a fifth of this value.
+/// Coulomb friction in the paper in N, the scale for the error of an estimate. An estimate follows the friction if the
+/// root mean square of its error is below a fifth of this value.
 const LEVEL: f64 = 25.0;
 /// Time in s before and after a transition within which a spike belongs to the transition.
 const NEAR: f64 = 0.01;
@@ -51,7 +51,7 @@ struct Window {
     theta: Extremes,
     /// Sum of squares of `f_fric - f_hat`.
     squares: f64,
-    /// The largest `|f_fric - f_hat|`, its time, and whether it is at a stick-slip transition.
+    /// The largest `|f_fric - f_hat|`, the time of this error, and whether this time is at a stick-slip transition.
     largest: f64,
     largest_at: f64,
     at_transition: bool,

@@ -13,7 +13,7 @@ pub(crate) const NOT_STARTED: u8 = 2;
 pub(crate) const ADVICE: &str = "with --isolate each FMU runs in a separate process, and its crash is an error of \
                       the run";
 
-/// Installs the handler, which reports the end and keeps the results so far; warns if that is not possible.
+/// Installs the handler, which reports the end and keeps the results so far; warns if the handler cannot be installed.
 pub(crate) fn watch() {
     if let Err(error) = crash::watch(ADVICE, logging::use_memory_of_thread, end) {
         tracing::warn!("crashes of FMUs cannot be reported: {error}");

@@ -244,7 +244,7 @@ struct CodeFile {
 
 impl CodeFiles {
     /// Whether the existing file at `path` is a runtime file, which is the same for every design and therefore does not
-    /// contain an `identity`. It is recognised by the first line of the file to be written at `path`.
+    /// contain an `identity`. A runtime file is recognised by the first line of the file to be written at `path`.
     fn is_runtime(&self, path: &Path, identity: &str) -> bool {
         let text = self.files.iter().find(|file| file.path == path).map(|file| &file.text);
         let start =
@@ -337,7 +337,7 @@ fn compare(options: &Options) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints `value` as JSON; an error names it `what`.
+/// Prints `value` as JSON; an error calls the value `what`.
 fn print_json(value: &impl Serialize, what: &str) -> anyhow::Result<()> {
     let text = serde_json::to_string_pretty(value);
     println!("{}", text.with_context(|| format!("cannot print {what}"))?);

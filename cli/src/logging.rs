@@ -49,7 +49,7 @@ pub(crate) fn use_memory_of_thread() {
     tracing::subscriber::with_default(nowhere, || tracing::error!("nothing"));
 }
 
-/// Largest number of messages that are kept; further ones are only counted.
+/// Largest number of messages that are kept; further messages are only counted.
 const LARGEST_KEPT: usize = 1000;
 
 /// Warnings and errors.
@@ -70,7 +70,7 @@ pub(crate) fn collect() {
 }
 
 /// Returns the first [`LARGEST_KEPT`] warnings and errors since [`collect`], and a line with the number of further
-/// ones; nothing without a call of `collect`.
+/// messages; nothing without a call of `collect`.
 pub(crate) fn collected() -> Vec<Message> {
     let collection = COLLECTION.lock().unwrap_or_else(PoisonError::into_inner);
     let Collection { mut messages, count } = collection.clone().unwrap_or_default();
@@ -140,7 +140,7 @@ fn percent(state: &ProgressState, text: &mut dyn fmt::Write) {
     let _ = write!(text, "{percent}");
 }
 
-/// A writer to standard error that hides progress bars while it writes.
+/// A writer to standard error that hides progress bars during a write.
 struct StandardError;
 
 impl Write for StandardError {

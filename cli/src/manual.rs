@@ -1,4 +1,4 @@
-//! `aso-ftc completions` and `aso-ftc man`: what a package of the command installs beside it.
+//! `aso-ftc completions` and `aso-ftc man`: completions and manual pages, which a package installs beside the command.
 
 use std::path::PathBuf;
 
@@ -33,7 +33,7 @@ pub(crate) fn completions(options: &CompletionOptions, mut command: clap::Comman
     print!("{}", String::from_utf8_lossy(&script).replace(&escaped[0], &escaped[1]));
 }
 
-/// Writes the manual pages of `command` and its verbs into the folder `--out`; without it, prints that of `command`.
+/// Writes the manual pages of `command` and its verbs to the folder `--out`; by default, prints the one of `command`.
 pub(crate) fn man(options: &ManOptions, command: clap::Command) -> anyhow::Result<()> {
     let pages = pages(command)?;
     let Some(folder) = &options.out else {

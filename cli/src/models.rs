@@ -42,7 +42,7 @@ fn missing(packed: &Path) -> String {
 }
 
 /// Returns the clone of this project that contains the current folder; otherwise prints and returns the clone in which
-/// the command was built. Returns an error if there is neither.
+/// the command was built. Returns an error if neither exists.
 pub(crate) fn clone() -> anyhow::Result<PathBuf> {
     if let Some(root) = clone_upwards()? {
         return Ok(root);

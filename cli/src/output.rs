@@ -1,9 +1,9 @@
 //! Prints to standard output and standard error. If a reader has closed one of them, as `| head` does,
 //! the command continues without output; after another error, as of a full disk, the exit status is not 0.
 //!
-//! The macros replace those of the standard library, which panic after an error. The words `error:` and
-//! `warning:` at the start of a text have the colours of clap's errors, unless the stream is no
-//! terminal or `NO_COLOR` is set; `CLICOLOR_FORCE` asks for colours everywhere.
+//! The macros replace the macros of the standard library, which panic after an error. The words `error:` and `warning:`
+//! at the start of a text have the colours of clap's errors, unless the stream is no terminal or `NO_COLOR` is set;
+//! `CLICOLOR_FORCE` asks for colours everywhere.
 
 use std::fmt::Arguments;
 use std::io::{self, Write as _};
@@ -46,8 +46,8 @@ fn note(done: io::Result<()>) {
     }
 }
 
-/// Parses the arguments of the command. If they are wrong or request help, prints that, and returns the exit status as
-/// an error.
+/// Parses the arguments of the command. If these are wrong or request help, prints the error or the help, and returns
+/// the exit status as an error.
 pub(crate) fn parse<P: clap::Parser>() -> Result<P, u8> {
     P::try_parse().map_err(|error| {
         note(error.print());
@@ -78,8 +78,8 @@ pub(crate) fn error(text: Arguments<'_>) {
     write(io::stderr(), &CHOICE, &text.to_string());
 }
 
-/// Writes `text` with or without colours. The first call decides that and keeps it in `choice`, because the environment
-/// cannot be read while a crash is handled.
+/// Writes `text` with or without colours. The first call decides on colours and keeps the decision in `choice`, because
+/// the environment cannot be read while a crash is handled.
 fn write(stream: impl RawStream + AsLockedWrite, choice: &OnceLock<ColorChoice>, text: &str) {
     let choice = choice.get_or_init(|| AutoStream::choice(&stream));
     note(AutoStream::new(stream, *choice).write_all(coloured(text).as_bytes()));

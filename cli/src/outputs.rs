@@ -1,4 +1,4 @@
-//! Writes the files of a command, all or none, and finds out whether an existing file is of the same design or results.
+//! Writes the files of a command, all or none, and checks whether an existing file has the same design or results.
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Read as _};
@@ -8,7 +8,7 @@ use std::{fs, io, process};
 use anyhow::{Context as _, bail, ensure};
 use results::is_stream;
 
-/// Bytes at the start of a file in which its identity is searched.
+/// Number of bytes at the start of a file in which the identity of its design or results is searched.
 const HEAD: u64 = 4096;
 
 /// The files to write, each under a temporary name until all are complete.
@@ -41,7 +41,7 @@ impl Outputs {
         write(&partial).map_err(Into::into).with_context(unwritten)
     }
 
-    /// Renames all files to their paths. If one cannot be renamed, restores the former files and returns an error.
+    /// Renames all files to their paths. If a file cannot be renamed, restores the former files and returns an error.
     pub(crate) fn commit(mut self) -> anyhow::Result<()> {
         let mut replacements: Vec<Replacement> = Vec::new();
         for Staged { partial, path } in &self.files {
@@ -87,8 +87,8 @@ impl Replacement {
         Ok(replacement)
     }
 
-    /// Restores the former file, or removes the new file if there was none. If this fails, returns a clause for the
-    /// error message.
+    /// Restores the former file, or removes the new file if there was no former file. On failure returns a clause for
+    /// the error message.
     fn undo(self) -> Option<String> {
         let Self { path, former } = self;
         let undone = match &former {
@@ -150,8 +150,8 @@ fn check_kind(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks that the output `path` may be overwritten: it does not exist, or `identity` is in its first [`HEAD`] bytes or
-/// in the design in an FMU. A folder, a pipe, a device or a file that cannot be read is an error.
+/// Checks that the output `path` may be overwritten: the file does not exist, or `identity` is in the first [`HEAD`]
+/// bytes or in the design in an FMU. A folder, a pipe, a device or a file that cannot be read is an error.
 pub(crate) fn check_identity(path: &Path, identity: &str) -> anyhow::Result<()> {
     check_kind(path)?;
     let mut head = Vec::new();

@@ -20,10 +20,10 @@ use figure::rasterise;
 
 use crate::{models, outputs};
 
-/// The equations of a model, from which the packer makes index.html. They are also in the FMU, so that
+/// The equations of a model, from which the packer makes index.html. The FMU also contains these equations, so that
 /// index.html can be made again for another design.
 const FRAGMENT: &str = fmu_description::documentation::FRAGMENT;
-/// The drawing of a model, from which the packer makes its picture.
+/// The drawing of a model, from which the packer makes the picture `model.png`.
 const DRAWING: &str = "model.svg";
 
 #[derive(clap::Args)]
@@ -137,7 +137,7 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<()> {
 struct PackOptions<'a> {
     /// Folder for the FMUs.
     out: &'a Path,
-    /// Folder with libraries that were built elsewhere, in place of the one built here.
+    /// Folder with libraries that were built elsewhere; `None` to build the library for this platform.
     binaries: Option<&'a Path>,
     #[cfg_attr(not(feature = "sbom"), expect(dead_code, reason = "refused without the feature"))]
     sbom: bool,

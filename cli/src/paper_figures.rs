@@ -21,10 +21,10 @@ pub(crate) const COLUMNS: [&str; 5] =
 
 /// Writes `figure5.svg`, `figure5.png`, `figure6.svg` and `figure6.png` into the folder `out`.
 ///
-/// `columns` returns the values of a column: `time` in s, `plant.x_p` in m, `plant.theta` in rad,
-/// `plant.f_fric` and `controller.f_hat` in N. `activation` is the time in s at which the
-/// compensation starts. A run that ends before it, or that diverges, is drawn as far as possible. Returns an error if a
-/// column is missing or has the wrong length, or if a file cannot be written.
+/// `columns` returns the values of a column: `time` in s, `plant.x_p` in m, `plant.theta` in rad, `plant.f_fric` and
+/// `controller.f_hat` in N. `activation` is the time in s at which the compensation starts. A run that ends before
+/// `activation`, or that diverges, is drawn as far as possible. Returns an error if a column is missing or has the
+/// wrong length, or if a file cannot be written.
 pub(crate) fn write<'a>(
     columns: &dyn Fn(&str) -> Option<&'a [f64]>,
     activation: f64,
@@ -46,7 +46,7 @@ struct Run<'a> {
     millimetres: Vec<f64>,
     milliradians: Vec<f64>,
     difference: Vec<f64>,
-    /// Time in s at which the compensation starts, and the text of its mark.
+    /// Time in s at which the compensation starts, and the text of the mark at this time.
     activation: f64,
     activation_text: String,
 }

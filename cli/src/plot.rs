@@ -9,7 +9,7 @@ use figure::{Figure, Ink, Panel, Series, rasterise, stairs};
 
 use crate::outputs;
 
-/// Colours of the curves in a panel; their number is the largest number of curves in a panel.
+/// Colours of the curves in a panel. The number of colours limits the number of curves in a panel.
 const INKS: [Ink; 7] =
     [Ink::Blue, Ink::Vermilion, Ink::Green, Ink::Purple, Ink::Sky, Ink::Orange, Ink::Black];
 /// Largest number of curves in a picture.

@@ -10,7 +10,7 @@ use report::{Comparison, Request, identity};
 use crate::outputs::{self, check_identity};
 use crate::run::split_names;
 
-/// Largest number of names in a line about what was not compared.
+/// Largest number of variables that a line about variables without comparison names.
 const LISTED: usize = 20;
 
 #[derive(clap::Args)]
@@ -80,7 +80,7 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints the largest difference relative to the range, or why there is none, and lists what was not compared.
+/// Prints the largest difference relative to the range, or why there is none, and lists the variables not compared.
 fn print_comparison(comparison: &Comparison, results: &Path, other: &Path) {
     let (here, there) = (results.display().to_string(), other.display().to_string());
     if comparison.rows == 0 {

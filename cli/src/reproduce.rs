@@ -145,7 +145,7 @@ fn settings(options: &Options) -> Vec<(String, String)> {
     options.scenario.settings().into_iter().chain(options.settings.iter().cloned()).collect()
 }
 
-/// Reads the columns that the figures need from a results file, as far as it has them.
+/// Reads the columns that the figures need from a results file, as far as the file has them.
 fn columns(path: &Path) -> anyhow::Result<HashMap<String, Vec<f64>>> {
     let table = Table::open(path)?;
     let mut columns = HashMap::new();

@@ -62,16 +62,16 @@ pub(crate) fn run(options: &Options) -> u8 {
     }
 }
 
-/// A run after its start with the data needed at its end.
+/// A started run, with the data needed at its end.
 struct ActiveRun {
     run: Run,
     /// The current folder at the start.
     folder: PathBuf,
     /// Units by variable, for the plot.
     units: Vec<(String, String)>,
-    /// What the report says about the run, if one is requested.
+    /// The properties of the run for the report, if a report is requested.
     report: Option<report::Run>,
-    /// The entries of the scenario at the start; further ones are interventions.
+    /// Number of entries of the scenario at the start; further entries are interventions.
     planned: PlannedEntries,
     /// The trace of the buses that the report can show.
     bus_trace: Option<PathBuf>,
@@ -79,7 +79,7 @@ struct ActiveRun {
     pace: Option<RealTime>,
     /// The live view, if one is requested.
     live: Option<Live>,
-    /// The log of calls and its path, if one is requested.
+    /// The log of calls and its path, if a log is requested.
     log_calls: Option<(CallLog, PathBuf)>,
 }
 
@@ -124,7 +124,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<ActiveRun>> {
 }
 
 /// Checks that no output file is also an input, and that no report or plot reads results back from a stream. Reserves
-/// standard output for the results if they go there.
+/// standard output for the results if the results go there.
 fn check_outputs(options: &Options, loaded: &LoadedConfig) -> anyhow::Result<()> {
     let config = &loaded.config;
     let results = config.results.file.as_deref();
@@ -224,7 +224,7 @@ fn check_plot(config: &Config, system: &System, ports: &[Port]) -> anyhow::Resul
     plot::check_count(numbers.len()).context("--plot")
 }
 
-/// Lists the first [`LISTED`] connections and the number of further ones.
+/// Lists the first [`LISTED`] connections and the number of further connections.
 fn connections(system: &System) -> String {
     let names = system.connections.iter().map(|connection| {
         format!("{} -> {}", system.name(connection.from), system.name(connection.to))
@@ -365,7 +365,7 @@ impl ActiveRun {
         by_page && !interrupt::is_raised()
     }
 
-    /// Writes the report, if one is requested, and prints its name.
+    /// Writes the report, if requested, and prints its name.
     fn report(&mut self, file: &Path, outcome: String, failed: bool) -> anyhow::Result<()> {
         let Some(run) = self.report.take() else { return Ok(()) };
         let scenario = &self.run.config.scenario;
@@ -425,7 +425,7 @@ impl ActiveRun {
         println!("{}", relative(path, &self.folder));
     }
 
-    /// Draws the plot of the results in `file`, if one is requested, and prints its name.
+    /// Draws the plot of the results in `file`, if requested, and prints its name.
     fn draw(&self, file: &Path) -> anyhow::Result<()> {
         let results = &self.run.config.results;
         let Some(picture) = results.plot_file.as_deref().filter(|_| !results.plot.is_empty())
@@ -455,7 +455,7 @@ fn relative(path: &Path, folder: &Path) -> String {
     path.strip_prefix(folder).unwrap_or(path).display().to_string()
 }
 
-/// Returns the command line of a run of `file`, with `option` before it.
+/// Returns the command line of a run of `file`, with `option` before `file`.
 fn run_command(option: &str, file: &str) -> String {
     let command = std::env::args().next().unwrap_or_else(|| "aso-ftc".to_owned());
     format!("{} run {option}{}", quoted(&command), quoted(file))

@@ -11,8 +11,8 @@ pub(crate) enum Scenario {
     PrintedGains,
 }
 
-/// The L printed after equation (21), in units of 1000, row by row, with the signs of `L[3,2]` and
-/// `L[4,2]` reversed: with the printed signs, A_0 - L C_0 is unstable.
+/// The observer gain L printed after equation (21) of the paper, in units of 1000, row by row, with the signs of
+/// `L[3,2]` and `L[4,2]` reversed: with the printed signs, A_0 - L C_0 is unstable.
 const PRINTED_L: [[f64; 2]; 5] =
     [[0.0380, -0.0048], [-0.0038, 0.0518], [0.3792, 0.1690], [-0.1297, 0.8841], [-3.3432, 0.8941]];
 

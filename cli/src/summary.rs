@@ -14,7 +14,7 @@ use serde::Serialize;
 use crate::claims::Claim;
 use crate::outputs;
 
-/// The design parameter alpha of equation (12) of the paper; it cancels in delta.
+/// The design parameter alpha of equation (12) of the paper; alpha cancels in delta.
 const ALPHA: f64 = 1.0;
 
 /// The content of `summary.json`.

@@ -17,7 +17,7 @@ const SHOWN: usize = 8;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "runs", rename_all = "kebab-case")]
 pub(super) enum TrialResult {
-    /// The FMU was initialised and stepped with its own start values.
+    /// The FMU was initialised and stepped with the start values of its description.
     Yes {
         steps: u32,
         /// Communication step in s.

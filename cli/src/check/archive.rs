@@ -31,8 +31,8 @@ const UTF8: u16 = 1 << 11;
 /// importer's folder.
 const LONG: usize = 180;
 
-/// Checks the archive at `path`, which can be unpacked safely and contains `names`. Returns an error if it cannot be
-/// read.
+/// Checks the archive at `path`, which can be unpacked safely and contains `names`. Returns an error if the archive
+/// cannot be read.
 pub(super) fn check(
     path: &Path,
     names: &[String],
@@ -108,7 +108,7 @@ fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
     }
 }
 
-/// Whether Windows does not allow this part of a path: it ends with a dot or a space, or is the name of a device.
+/// Whether Windows does not allow `part` of a path: it ends with a dot or a space, or is the name of a device.
 fn breaks_windows(part: &str) -> bool {
     let stem = part.split('.').next().unwrap_or(part).to_ascii_lowercase();
     let is_port = stem.starts_with("com") || stem.starts_with("lpt");
@@ -225,7 +225,7 @@ fn sources(names: &[String], description: &ModelDescription, findings: &mut Find
     }
 }
 
-/// Normalises a path to slashes without `.` and `..`; `None` if it leaves the archive.
+/// Normalises a path to slashes without `.` and `..`; `None` if the path leaves the archive.
 fn normal(path: &str) -> Option<String> {
     let mut parts: Vec<&str> = Vec::new();
     for part in path.split(['/', '\\']) {

@@ -22,7 +22,7 @@ const VARIABLES: usize = 1000;
 /// causes such differences.
 const ROUNDING: f64 = 1e-6;
 
-/// Number of messages of all instances of a trial above which their number is a finding.
+/// Number of messages of all instances of a trial above which the trial gives a finding.
 const FLOOD: u64 = 10_000;
 
 /// A function that creates an instance with the given name. If a former instance is given, the function frees it and
@@ -57,12 +57,12 @@ pub(super) fn check<S: Slave>(
 
 struct Trial<'a, S> {
     description: &'a ModelDescription,
-    /// Number of steps of each of the two instances whose outputs are compared.
+    /// Number of steps that the first two instances make, to compare their outputs.
     count: u32,
     make: &'a mut MakeInstance<'a, S>,
     /// Result of the first instance.
     result: TrialResult,
-    /// The settings of its process that the FMU has changed, as texts of findings.
+    /// The process-wide settings that the FMU has changed, as texts of findings.
     changes: BTreeSet<String>,
     findings: Findings,
 }
@@ -106,7 +106,7 @@ impl<S: Slave> Trial<'_, S> {
         self.check_states();
     }
 
-    /// Records the steps of the first instance; if they are fewer than planned, the last note is the reason.
+    /// Records the steps of the first instance; if there are fewer steps than planned, the last note is the reason.
     fn record_success(&mut self, trajectory: &Trajectory) {
         let steps = u32::try_from(trajectory.len().saturating_sub(1)).unwrap_or(u32::MAX);
         let note = self.findings.all.iter().rfind(|finding| finding.severity == Note);
@@ -130,7 +130,7 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Adds a finding for two trajectories that differ, with the first step at which they do.
+    /// Adds a finding for two trajectories that differ, with the first step at which the outputs differ.
     fn report_difference(&mut self, first: &Trajectory, second: &Trajectory) {
         let step = first.iter().zip(second).position(|(one, other)| one != other);
         // If all common steps are equal, one of the trajectories is shorter.
@@ -140,8 +140,8 @@ impl<S: Slave> Trial<'_, S> {
         self.findings.add(Warning, "fmi2DoStep", what, why, "2.1");
     }
 
-    /// Creates an instance, in place of the `former` one, and initializes it. If that fails, adds a finding and returns
-    /// `None`.
+    /// Creates an instance, in place of the `former` one, and initializes the new one. On failure adds a finding and
+    /// returns `None`.
     fn initialize(&mut self, name: &str, stop_time: Option<f64>, former: Option<S>) -> Option<S> {
         let mut slave = match (self.make)(name, former) {
             Ok(slave) => slave,
@@ -186,7 +186,7 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Adds a finding for a failed call, and a warning if it failed without a message.
+    /// Adds a finding for a failed call, and a warning if the FMU sent no message about the failure.
     fn report(&mut self, error: &CallError, when: &str, section: &'static str) {
         let what = format!("{} {when}", error.failure);
         let messages = error.messages.join("; ");
@@ -203,8 +203,8 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Whether the FMU should explain its errors by messages although logging is off. In FMI 3.0 it may do so only if
-    /// it has a category for errors, as the importer switches on the categories of statuses (FMI 3.0.2, section 2.3.1).
+    /// Whether the FMU should explain its errors by messages although logging is off. In FMI 3.0 it should only if it
+    /// has a category for errors, as the importer switches on the categories of statuses (FMI 3.0.2, section 2.3.1).
     fn explains_errors(&self) -> bool {
         let mut categories = self.description.log_categories.iter();
         self.description.version() != Version::V3
@@ -363,8 +363,8 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Checks that the FMU refuses an unknown value reference. Skips FMI 3.0, where our importer refuses it before the
-    /// call.
+    /// Checks that the FMU refuses an unknown value reference. Skips FMI 3.0, where our importer refuses the reference
+    /// before the call.
     fn check_unknown_reference(&mut self) {
         if self.description.version() == Version::V3 {
             return;
@@ -388,7 +388,7 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Sets real inputs to their present values. An FMU may refuse that, but must not end or block the process.
+    /// Sets real inputs to their present values. An FMU may refuse to set them, but must not end or block the process.
     fn set_inputs(&mut self) {
         let inputs = |variable: &&ScalarVariable| variable.causality == Causality::Input;
         let is_real = |variable: &&ScalarVariable| ValueType::of(&variable.kind) == ValueType::Real;

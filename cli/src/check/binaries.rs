@@ -54,7 +54,7 @@ const PLATFORMS: [Platform; 18] = {
     ]
 };
 
-/// A function that reads the bytes of a file of the FMU, by its name in the archive.
+/// A function that reads the bytes of a file of the FMU, by the file's name in the archive.
 pub(crate) type Read<'a> = dyn Fn(&str) -> io::Result<Vec<u8>> + 'a;
 
 /// The files of an FMU.
@@ -110,8 +110,8 @@ pub(crate) fn check(
     findings.all
 }
 
-/// Returns the functions that a library must export. FMI 1.0: those of co-simulation, prefixed with the model
-/// identifier; FMI 2.0: those of `interfaces`; FMI 3.0: all.
+/// Returns the functions that a library must export. FMI 1.0: functions of co-simulation, prefixed with the model
+/// identifier; FMI 2.0: functions of `interfaces`; FMI 3.0: all.
 fn required(version: Version, interfaces: &[InterfaceType], identifier: &str) -> Vec<String> {
     match version {
         // The functions of model exchange of FMI 1.0 are not checked.
@@ -233,7 +233,7 @@ fn library(
     versions(&file, path, findings);
 }
 
-/// Returns the part for `machine` of a universal macOS file, `None` if it has none; any other file as a whole.
+/// Returns the part for `machine` of a universal macOS file, `None` without such a part; any other file as a whole.
 fn slice_of(bytes: &[u8], machine: Architecture) -> Option<&[u8]> {
     use object::read::macho::{FatArch as _, MachOFatFile32, MachOFatFile64};
     if let Ok(fat) = MachOFatFile32::parse(bytes) {
@@ -341,7 +341,7 @@ fn needs(file: &object::File<'_>, path: &str, names: &[String], findings: &mut F
     }
 }
 
-/// Adds a note with the newest version of glibc that a library for Linux needs, if it needs one.
+/// Adds a note with the newest version of glibc that a library for Linux needs, if the library needs glibc.
 fn versions(file: &object::File<'_>, path: &str, findings: &mut Findings) {
     let versions = file.imports().into_iter().flatten().flatten().filter_map(|import| {
         let ImportFlags::Elf { version: Some(version), .. } = import.flags() else { return None };

@@ -7,7 +7,7 @@ use super::finding::{Finding, Findings, Part, Severity, Tool};
 
 const FILE: &str = "modelDescription.xml";
 
-/// A rule of the standard: the effect of breaking it on importers, and the tools that this stops.
+/// A rule of the standard: the effect of breaking it on importers, and the tools that refuse the FMU then.
 struct Rule {
     /// Words in the text of a problem by which the rule is recognised; the first rule that fits counts.
     words: &'static str,

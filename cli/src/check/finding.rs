@@ -68,10 +68,10 @@ impl Serialize for Tool {
 pub(crate) struct Finding {
     pub(crate) severity: Severity,
     pub(crate) part: Part,
-    /// The file, the place in it, or the function.
+    /// The subject: the file, the element or variable, or the function.
     #[serde(rename = "where")]
     pub(crate) place: String,
-    /// What was expected, and what was found.
+    /// Expected and actual content.
     pub(crate) what: String,
     /// The effect on importers.
     pub(crate) why: Option<String>,

@@ -23,7 +23,7 @@ impl fmt::Display for FindingGroup<'_> {
     }
 }
 
-/// What all findings of a group have in common: severity, part, patterns of place, what and why, section, stops.
+/// The common properties of all findings of a group: severity, part, patterns of place, what and why, section, stops.
 type Key<'a> = (Severity, Part, String, String, Option<String>, Option<&'static str>, &'a [Tool]);
 
 /// Groups findings by kind, in the order of their first occurrence. Two findings have the same kind if they differ only

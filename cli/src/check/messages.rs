@@ -13,7 +13,7 @@ use crate::logging::{FMU, fields};
 pub(super) struct MessageSummary {
     /// The log categories of the messages; empty for messages without one.
     pub(super) categories: BTreeSet<String>,
-    /// Number of messages, including those that were lost because there were too many.
+    /// Number of messages, including messages that were lost because there were too many.
     pub(super) messages: u64,
 }
 

@@ -45,8 +45,8 @@ pub(super) fn renamed(text: &str, version: Version) -> String {
     })
 }
 
-/// Replaces sections of FMI 2.0.5 in `findings` by those of `version`. Removes a section that has no counterpart; FMI
-/// 1.0 has none.
+/// Replaces sections of FMI 2.0.5 in `findings` by sections of `version`. Removes a section that has no counterpart;
+/// FMI 1.0 has none.
 pub(super) fn renumber(findings: &mut [Finding], version: Version) {
     for finding in findings {
         let pair = PAIRS.iter().find(|(second, _)| finding.section == Some(*second));

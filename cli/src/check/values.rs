@@ -67,7 +67,7 @@ impl Value {
 }
 
 /// Returns the largest difference between two trajectories of outputs, relative to the largest magnitude of each
-/// output. It is infinite if the lengths differ, or if values differ that are not finite real numbers.
+/// output. The difference is infinite if the lengths differ, or if values that are not finite real numbers differ.
 pub(super) fn distance(one: &[Vec<Value>], other: &[Vec<Value>]) -> f64 {
     if one.len() != other.len() {
         return f64::INFINITY;
@@ -86,7 +86,7 @@ pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Va
     master::read_value(slave, variable.value_reference, ValueType::of(&variable.kind)).map(Value)
 }
 
-/// Returns the start value in the XML; `None` if it states none.
+/// Returns the start value in the XML; `None` without a stated start value.
 pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
     let start = match &variable.kind {
         Kind::String(start) => start.clone().map(master::Value::String),

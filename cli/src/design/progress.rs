@@ -13,7 +13,7 @@ use crate::logging;
 
 /// Number of parts of the bar.
 const PARTS: f64 = 1000.0;
-/// Interval at which the bar is drawn again with the elapsed time.
+/// Interval at which the progress bar is redrawn, to update the elapsed time.
 const REDRAW: Duration = Duration::from_millis(200);
 /// Interval between two lines where standard error is no terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
@@ -25,7 +25,7 @@ pub(super) enum Reporter {
     Lines(Lines),
 }
 
-/// The thread that prints a line every 10 s. Dropping the sender ends it.
+/// The thread that prints a line every 10 s. The drop of the sender ends the thread.
 pub(super) struct Lines {
     /// The step that the next line names; `None` before the first one.
     latest: Arc<Mutex<Option<Progress>>>,

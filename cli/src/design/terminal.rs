@@ -14,8 +14,8 @@ use design::{Comparison, Report};
 /// Largest number of rows or columns of a gain, of eigenvalues and of commands that are printed.
 const LARGEST_SHOWN: usize = 16;
 
-/// Entries of a gain below this fraction of its largest entry are printed as 0; so are steady-state errors below this
-/// value.
+/// Entries of a gain below this fraction of the largest entry, and steady-state errors below this value, are printed as
+/// 0.
 const ROUNDING: f64 = 1e-14;
 
 /// Prints the summary: gains, eigenvalues, robustness, families and schedules, detection, losses, checks that fail,
@@ -95,7 +95,7 @@ pub(crate) fn summarise(report: &Report) {
     }
 }
 
-/// Prints the gains of a controller of low order, and its times `T_i` and `T_d` if its gains have the same sign.
+/// Prints the gains of a controller of low order, and `T_i` and `T_d` if all its gains have the same sign.
 fn print_pid(controller: &PidController) {
     let PidController { command, measurement, proportional, integral, .. } = controller;
     let mut gains =
@@ -123,7 +123,7 @@ fn print_pid(controller: &PidController) {
     }
 }
 
-/// Prints what varies within its tolerance, and whether the loop stays stable.
+/// Prints the entries or parameters that vary within their tolerances, and whether the loop stays stable.
 fn print_tolerance(tolerance: &ToleranceResult) {
     if !tolerance.is_examined() {
         println!("parameter tolerances: not examined, no entry of the plant varies");
@@ -141,8 +141,8 @@ fn print_tolerance(tolerance: &ToleranceResult) {
     println!("    {}, {worst}", stable_cases(tolerance));
 }
 
-/// Prints the fraction of the tolerances for which stability is proven, or why there is none; prints nothing if nothing
-/// varies.
+/// Prints the fraction of the tolerances for which stability is proven, or why nothing is proven; prints nothing
+/// without tolerances.
 fn print_proof(tested: &ToleranceResult, proof: &Result<ToleranceProof, String>) {
     match proof {
         _ if !tested.is_examined() => {}
@@ -161,7 +161,7 @@ fn stable_cases(tolerance: &ToleranceResult) -> String {
     })
 }
 
-/// Prints the controller for the loss of each actuator, and of several ones, or why there is none.
+/// Prints the controller for the loss of each actuator, and of several actuators, or why there is no controller.
 fn print_reconfigurations(reconfiguration: &ReconfigurationReport) {
     let single = reconfiguration.without.iter().map(|loss| (loss.actuator.clone(), &loss.outcome));
     let several =
@@ -282,7 +282,7 @@ fn print_detection(detection: &Detection) {
     }
 }
 
-/// Prints what is proven about the losses of effectiveness of one loop.
+/// Prints the stability that is proven for losses of effectiveness in one loop.
 fn print_losses(loss: &LossLoop) {
     let described = |losses: &[Number]| {
         let one = |loss: &Number| format!("{} {}", loss.name, number(loss.value));

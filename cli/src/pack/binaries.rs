@@ -47,8 +47,8 @@ pub(super) fn targets(folder: &Path) -> anyhow::Result<Vec<&'static str>> {
 ///
 /// # Errors
 ///
-/// Returns an error if a file cannot be read, if there is no library, or if importers may refuse one: built for
-/// another platform than its folder, without a function of the standard, or with a library that it needs and lacks.
+/// Returns an error if a file cannot be read, if there is no library, or if importers may refuse one: built for another
+/// platform than its folder, without a function of the standard, or without another library that the library needs.
 pub(super) fn collect(
     folder: &Path,
     description: &ModelDescription,

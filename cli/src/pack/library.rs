@@ -17,7 +17,7 @@ use cargo_metadata::{
 /// The profile `fmu`, for workspaces without a profile of this name.
 const PROFILE: &str = include_str!("fmu-profile.toml");
 
-/// The library of a crate with the packages compiled into it.
+/// The library of a crate, with the list of the packages that it contains.
 pub(super) struct Library {
     pub(super) file: PathBuf,
     pub(super) package: Package,
@@ -26,7 +26,7 @@ pub(super) struct Library {
     pub(super) toolchain: Toolchain,
 }
 
-/// The compiler whose standard library is in the library.
+/// The compiler that built the library, and whose standard library is a part of it.
 #[derive(Clone)]
 pub(super) struct Toolchain {
     pub(super) release: String,
@@ -34,14 +34,14 @@ pub(super) struct Toolchain {
     host: String,
 }
 
-/// Builds the libraries of the crates in `folders`, in their order. Cargo builds the crates of one workspace together,
+/// Builds the libraries of the crates in `folders`, in this order. Cargo builds the crates of one workspace together,
 /// so that it compiles them in parallel; `locked` is `--locked` of cargo. The dependencies include the dependencies on
 /// the targets `others`, for which the libraries are built elsewhere.
 ///
 /// # Errors
 ///
-/// Returns an error if there is no such crate or it is not a `cdylib` (both with its folder), or if it does not
-/// compile.
+/// Returns an error if a folder has no crate or the crate is not a `cdylib` (both errors name the folder), or if a
+/// crate does not compile.
 pub(super) fn build(
     folders: &[PathBuf],
     locked: bool,
@@ -183,8 +183,8 @@ fn metadata(folder: &Path, host: &str, locked: bool) -> anyhow::Result<Metadata>
 ///
 /// The libraries contain no local path, so that the same sources give the same bytes. Only code written by a build
 /// script can contain the path of the target folder. The flag that replaces this path has a cost: cargo builds
-/// everything again after the folder is moved. It is therefore added, in a second build, only if a library contains
-/// the path; a marker file records this for later calls.
+/// everything again after the folder is moved. The flag is therefore added, in a second build, only if a library
+/// contains the path; a marker file records this for later calls.
 fn compile<'a>(
     source: &Source,
     members: impl Iterator<Item = &'a Source>,

@@ -56,9 +56,9 @@ fn line(package: &Crate) -> String {
     format!("{} {}: {license}\n", package.name, package.version)
 }
 
-/// Returns the files with licence texts: the one that the manifest states, and those of the first folder that has any,
-/// from the folder of the package upwards to its workspace. For a vendored or registry package only its own folder is
-/// searched, since the folders above belong to other packages.
+/// Returns the files with licence texts: the file that the manifest states, and the files of the first folder with
+/// licence texts, from the folder of the package upwards to its workspace. For a vendored or registry package only its
+/// own folder is searched, since the folders above belong to other packages.
 fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
     let stated = package.license_file().map(PathBuf::from).filter(|path| path.is_file());
     let is_from_registry =

@@ -1,6 +1,6 @@
-//! A bill of materials of an FMU in `CycloneDX` 1.5: the model and what is compiled into its libraries.
+//! A bill of materials of an FMU in `CycloneDX` 1.5: the model and the packages compiled into its libraries.
 //!
-//! It has neither a time nor a serial number, so that the same sources give the same bytes.
+//! The bill has neither a time nor a serial number, so that the same sources give the same bytes.
 
 use anyhow::{Context, bail};
 use cargo_metadata::{Package as Crate, Source};

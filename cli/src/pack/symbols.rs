@@ -27,7 +27,7 @@ pub(super) fn hide_unneeded(library: &mut [u8], version: Version, describes: boo
 }
 
 /// Returns the offsets in the file of the dynamic symbols that are functions of FMI or of the exporter and not
-/// `needed`. Returns an error if it is no 64-bit ELF library.
+/// `needed`. Returns an error if `library` is no 64-bit ELF library.
 fn places(library: &[u8], needed: impl Fn(&[u8]) -> bool) -> object::Result<Vec<usize>> {
     let header = FileHeader64::<LittleEndian>::parse(library)?;
     let endian = header.endian()?;

@@ -50,8 +50,8 @@ pub(super) fn facts(system: &System, plan: &Plan, plotted: &[String]) -> Run {
     }
 }
 
-/// Returns the settings, the steps of signals and the faults of a scenario with their times; settings and faults after
-/// the `planned` ones are interventions. A fault without a time starts at the `start` of the run.
+/// Returns the settings, the steps of signals and the faults of a scenario with their times; settings and faults beyond
+/// the numbers in `planned` are interventions. A fault without a time starts at the `start` of the run.
 pub(super) fn marks(scenario: &Scenario, planned: PlannedEntries, start: f64) -> Vec<Mark> {
     let kind = |at: usize, planned: usize, kind| {
         if at < planned { kind } else { MarkKind::Intervention }

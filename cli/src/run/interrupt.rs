@@ -16,7 +16,7 @@ const CALL: Duration = Duration::from_millis(800);
 const STEP: Duration = Duration::from_secs(5);
 /// Interval of checks whether calls return.
 const LOOK: Duration = Duration::from_millis(50);
-/// A second signal within this time is taken for the first one, which was sent to the process and to its group.
+/// A second signal within this time counts as the first one, sent both to the process and to its group.
 const TOGETHER: Duration = Duration::from_millis(200);
 
 /// Whether signals are handled.

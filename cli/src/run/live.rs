@@ -24,7 +24,7 @@ const SIGNALS: usize = 500;
 const SETTINGS: usize = 5000;
 /// Interval between checks for a signal of the operating system while the run is paused.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest time that the command waits at its end for an open page to show it.
+/// Longest time that the command waits at its end for an open page to show the outcome.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// State of the run at its start, as `--live` gives it.
@@ -43,17 +43,17 @@ pub(super) struct Live {
     /// Whether the signals can be read; false after the first error.
     readable: bool,
     phase: Phase,
-    /// Whether the run pauses again after the step that it makes.
+    /// Whether the run pauses again after its next step.
     pauses_again: bool,
     start: Instant,
     /// Time of all pauses and requests.
     paused: Duration,
     /// Comment lines of the file that repeats the run: its purpose, the interventions, and the stop.
     remarks: Vec<String>,
-    /// The file that repeats the run, in the folder of the results. It has another name for a resumed run, so that it
-    /// does not replace the file of the run before the checkpoint.
+    /// The file that repeats the run, in the folder of the results. The file of a resumed run has another name, so that
+    /// it does not replace the file of the run before the checkpoint.
     file: PathBuf,
-    /// The message logged at the first write, if it replaces the file of an earlier run.
+    /// The message at the first write of the file if the file of an earlier run is replaced.
     replacement: Option<String>,
     /// Whether the page has stopped the run.
     pub(super) stopped: bool,
@@ -136,7 +136,7 @@ impl Live {
         if self.view.is_called() { self.perform_all(run, pace) } else { ControlFlow::Continue(()) }
     }
 
-    /// Publishes a sample if one is due, and performs all requests, during a pause until it ends.
+    /// Publishes a sample if one is due, and performs all requests, during a pause until the pause ends.
     #[cold]
     fn perform_all(&mut self, run: &mut Run, pace: Option<&mut RealTime>) -> ControlFlow<()> {
         let due = self.view.take_calls();
@@ -219,7 +219,7 @@ impl Live {
         Ok(format!("Accepted: it takes effect at t = {from} s, or at the later time of an entry."))
     }
 
-    /// Writes the file that repeats the run, and logs that it replaces one of an earlier run; an error is also logged.
+    /// Writes the file that repeats the run, and logs if it replaces the file of an earlier run; also logs an error.
     fn write(&mut self, run: &Run) -> Result<(), String> {
         let text = self.repetition(run).map_err(|error| error.sentence())?;
         if let Some(replacement) = self.replacement.take() {
@@ -233,7 +233,7 @@ impl Live {
     }
 
     /// Returns the complete configuration of the run with all interventions. Its results, its plot and its bus trace
-    /// have other names than those of the run, and there is no checkpoint.
+    /// have other names than in the run, and there is no checkpoint.
     fn repetition(&self, run: &Run) -> Result<String, Error> {
         let mut config = run.config.clone();
         let results = &mut config.results;
@@ -253,7 +253,7 @@ impl Live {
         Ok(remarks + &config.render()?)
     }
 
-    /// Publishes the values of the signals, NaN if they cannot be read; the first error is a warning.
+    /// Publishes the values of the signals, NaN for values that cannot be read; the first error is a warning.
     pub(super) fn sample(&mut self, run: &mut Run, pace: Option<&RealTime>) {
         let start = Instant::now();
         let time = run.simulation.time();

@@ -12,7 +12,7 @@ const INPUTS: usize = 20;
 const OUTPUTS: usize = 3;
 
 /// Returns a heading, a line for each of the first [`INPUTS`] inputs without a connection, a setting and a signal, and
-/// the number of further ones; empty for a single FMU and if there are none. Leaves out clocks, which have no value.
+/// the number of further inputs; empty for a single FMU or without such inputs. Leaves out clocks.
 pub(super) fn list(prepared: &PreparedRun) -> String {
     let system = &prepared.system;
     let mut open = if system.slaves.len() > 1 { system.free_inputs() } else { Vec::new() };

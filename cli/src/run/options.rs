@@ -366,7 +366,7 @@ fn method(text: &str) -> Result<Method, String> {
 }
 
 impl AlgorithmOptions {
-    /// Overwrites the settings in `request` with the options stated, and adds those of `--every`.
+    /// Overwrites the settings in `request` with the options stated, and adds the settings of `--every`.
     pub(crate) fn apply(&self, request: &mut AlgorithmRequest) {
         put(&mut request.step, self.step);
         put(&mut request.method, self.method);
@@ -423,7 +423,7 @@ impl Options {
     }
 
     /// Returns the configuration of the checkpoint, of the system or of the FMUs stated, without further options;
-    /// without any of them, that of the default system.
+    /// without any of these, the configuration of the default system.
     fn base(&self) -> anyhow::Result<(LoadedConfig, Option<SavedRun>)> {
         if let Some(path) = &self.safety.resume {
             let saved = SavedRun::read(path)?;
@@ -500,7 +500,7 @@ impl Options {
         Ok(())
     }
 
-    /// Whether the command line states FMUs by their paths in place of the file of a system.
+    /// Whether the command line states FMUs by their paths instead of a system file.
     pub(super) fn names_fmus_by_file(&self) -> bool {
         self.system.inputs.first().is_some_and(|path| is_fmu(path))
     }
@@ -562,8 +562,8 @@ impl Options {
     }
 }
 
-/// Returns `path` with the extension of a format. It replaces `.csv` and `.parquet`; it is appended to any other name,
-/// whose last point may belong to a number, as in `k=1.5`.
+/// Returns `path` with the extension of a format. This extension replaces `.csv` and `.parquet`, and is appended to any
+/// other name, where the last point may belong to a number, as in `k=1.5`.
 fn with_format(path: PathBuf, format: &str) -> PathBuf {
     if ["csv", "parquet"].iter().any(|ending| has_ending(&path, ending)) {
         return path.with_extension(format);
