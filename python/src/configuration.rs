@@ -79,7 +79,7 @@ fn plain(py: Python<'_>, mut config: Config) -> PyResult<Bound<'_, PyAny>> {
 
 /// Applies `changes` to the entries of `base` that a run may change, which exclude the system itself. Replaces values,
 /// lists, settings of the same name and entries of `algorithm.every`; appends entries of the scenario. `stated` has the
-/// nested dicts of `changes`, which tell an empty list (it clears a list) from one that is not stated.
+/// nested dicts of `changes`, which distinguish an empty list (which clears the list) from a list that is not stated.
 pub(crate) fn merge(base: &mut Config, changes: Config, stated: &Bound<'_, PyAny>) {
     for (name, value, place) in changes.settings.0 {
         base.settings.0.retain(|(known, _, _)| *known != name);

@@ -11,7 +11,7 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 use crate::error::{self, Exception};
 use crate::guard::guarded;
 
-/// Largest number of elements of an array whose start values are listed; a larger array has `None`.
+/// Largest number of elements of an array whose start values are listed; the start value of a larger array is `None`.
 const ELEMENTS: usize = 1_000_000;
 
 /// Returns the model description of the FMU at `path` (an archive or a folder) as a dict. Its entry `warnings` lists

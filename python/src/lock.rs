@@ -40,7 +40,7 @@ pub(crate) fn lock_file(path: PathBuf) -> PyResult<Option<FileLock>> {
     Ok(Some(FileLock { file: Mutex::new(file) }))
 }
 
-/// Opens a file to lock it, for reading if it may not be written; `None` if it may not be read either.
+/// Opens a file to lock it, for reading if the file may not be written; `None` if reading is not allowed either.
 fn open(path: &Path) -> io::Result<Option<File>> {
     match File::options().read(true).write(true).create(true).truncate(false).open(path) {
         Err(error)

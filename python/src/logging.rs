@@ -19,7 +19,7 @@ use tracing::{Event, Level, Metadata, Subscriber};
 const MODULE: &str = "aso_ftc._logging";
 /// `target` of the messages of FMUs.
 const FMU: &str = "fmu";
-/// Largest number of messages that wait at the same time; further ones are counted only.
+/// Largest number of messages that wait at the same time; further messages are only counted.
 const WAITING: usize = 10_000;
 
 /// The messages that wait.
@@ -74,7 +74,7 @@ pub(crate) fn is_debugging() -> bool {
 ///
 /// # Errors
 ///
-/// The exception of a logging handler; the messages after the one that caused it are dropped.
+/// The exception of a logging handler; messages after the message that caused the exception are dropped.
 pub(crate) fn pass_on(py: Python<'_>) -> PyResult<()> {
     let messages = {
         let mut waiting = MESSAGES.lock().unwrap_or_else(PoisonError::into_inner);

@@ -136,7 +136,7 @@ impl Node {
     }
 }
 
-/// Returns the message `what`, prefixed with the place of the value that it is about; the outermost value has no place.
+/// Returns the message `what` after the place of the value in question; the outermost value has no place.
 fn at(place: &str, what: &str) -> String {
     if place.is_empty() { what.to_owned() } else { format!("{place}: {what}") }
 }

@@ -28,17 +28,17 @@ pub(crate) struct PythonSlave {
     /// Start time in s.
     start: f64,
     raised: Raised,
-    /// For each slot, the values and the state of the object.
+    /// For each slot, the saved values and the saved state of the Python object.
     saved: Vec<Option<(Vec<f64>, Py<PyAny>)>>,
     /// Whether the object is to be stopped: after `start`, until `stop`.
     is_started: bool,
 }
 
 impl PythonSlave {
-    /// Creates a slave from `object`. Its attributes `inputs` and `outputs` are names, or a mapping of names to start
-    /// values (`float`, `int` or `bool`, also of `NumPy`); without a start value, a variable is the `float` 0.
-    /// The attribute `direct` (default true) says whether outputs depend on the inputs of the same time. With functions
-    /// `save` and `restore` the slave can save its state.
+    /// Creates a slave from `object`. The attributes `inputs` and `outputs` of the object are names, or a mapping of
+    /// names to start values (`float`, `int` or `bool`, also of `NumPy`); without a start value, a variable is the
+    /// `float` 0. The attribute `direct` (default true) says whether outputs depend on the inputs of the same time.
+    /// With functions `save` and `restore` the slave can save its state.
     ///
     /// # Errors
     ///
@@ -150,7 +150,7 @@ impl PythonSlave {
         Ok(outputs)
     }
 
-    /// Sets the values at these positions.
+    /// Sets the values at the given positions.
     fn store(&mut self, outputs: Vec<(usize, f64)>) {
         for (position, value) in outputs {
             self.values[position] = value;
@@ -303,7 +303,7 @@ impl Drop for PythonSlave {
     }
 }
 
-/// Calls the function `stop` of the object, if it has one.
+/// Calls the function `stop` of the object, if the object has one.
 fn stop(object: &Bound<'_, PyAny>) -> PyResult<()> {
     match object.getattr_opt("stop")? {
         Some(function) => function.call0().map(|_| ()),
@@ -329,8 +329,8 @@ impl Start {
     }
 }
 
-/// Checks that a value is an `Integer` of FMI 2.0, as required of a variable that starts with an integer. Returns
-/// the error message otherwise, in which `what` says what the value is, such as "the output".
+/// Checks that a value is an `Integer` of FMI 2.0, as required of a variable that starts with an integer. Otherwise
+/// returns the error message, in which `what` is the role of the value, such as "the output".
 fn check_integer(what: &str, name: &str, value: f64) -> Result<(), String> {
     if value.fract() == 0.0 && (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&value) {
         return Ok(());
@@ -359,7 +359,7 @@ fn declarations(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(Str
     declaration.try_iter()?.map(|name| Ok((name?.extract()?, Start::Real(0.0)))).collect()
 }
 
-/// Reads a start value. A bool is an int in Python, so it is tested first.
+/// Reads a start value. A bool is an int in Python, so the test for bool is first.
 fn start(value: &Bound<'_, PyAny>) -> PyResult<Start> {
     use pyo3::types::{PyBool, PyInt};
     // `item` converts a scalar of `NumPy`, which is neither an int nor a bool of Python.

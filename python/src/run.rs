@@ -63,7 +63,7 @@ pub(crate) struct Study {
 /// An input over time: its name, and its times and values as the bytes of `f64`.
 type TableInMemory = (String, PyBackedBytes, PyBackedBytes);
 
-/// Slaves with the exceptions that they raise.
+/// Slaves by name, and the last exception that a Python slave raised.
 type Slaves = (Vec<(String, Box<dyn Slave>)>, Raised);
 
 #[pymethods]
@@ -177,7 +177,7 @@ impl Study {
 }
 
 impl Study {
-    /// Returns the configuration of a run with these changes.
+    /// Returns the configuration of a run with `changes` applied.
     fn with_changes(&self, changes: &Bound<'_, PyAny>) -> PyResult<LoadedConfig> {
         let mut config = self.config.clone();
         if changes.len()? > 0 {
@@ -244,7 +244,7 @@ struct EndedRun {
     watch: Watch,
 }
 
-/// Runs to the end, with the interpreter released.
+/// Runs to the end; other Python threads may run meanwhile.
 fn run(
     loaded: LoadedConfig,
     slaves: Vec<(String, Box<dyn Slave>)>,
@@ -291,7 +291,7 @@ fn run(
 /// A function of time that returns values of inputs.
 struct Input {
     function: Py<PyAny>,
-    /// The inputs that were set so far, by name.
+    /// The ports of the inputs that were set so far, by name.
     ports: HashMap<String, Port>,
 }
 

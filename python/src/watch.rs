@@ -13,8 +13,8 @@ use crate::logging;
 
 /// Interval at which a run looks for signals, in wall-clock time.
 const INTERVAL: Duration = Duration::from_millis(20);
-/// Number of steps between two readings of the clock while they take less than [`SHORT`]; otherwise the clock is read
-/// after each step.
+/// Number of steps between two readings of the clock while these steps take less than [`SHORT`]; otherwise the clock is
+/// read after each step.
 const STRIDE: u32 = 8;
 const SHORT: Duration = Duration::from_millis(1);
 /// Number of parts of the progress bar.
@@ -118,7 +118,7 @@ pub(crate) struct Watch {
     last_reading: Instant,
     /// Time of the last call of [`Watch::look`].
     last_look: Instant,
-    /// Why the run is to end; `None` while it goes on.
+    /// Reason why the run is to end; `None` while the run goes on.
     pub(crate) stop: Option<Stop>,
 }
 
@@ -154,8 +154,8 @@ impl Watch {
         })
     }
 
-    /// Call this after every step, with the time reached in s; a call before the first step is possible. Breaks and
-    /// sets `stop` if the run should end.
+    /// Checks limits and signals; call this after every step, with the time reached in s; a call before the first step
+    /// is possible. Breaks and sets `stop` if the run should end.
     #[inline]
     pub(crate) fn after_step(&mut self, time: f64) -> ControlFlow<()> {
         self.left -= 1;
