@@ -1,4 +1,4 @@
-//! What to change in a design that is not green.
+//! Changes that may improve a design that is not green.
 
 use maud::{Markup, html};
 
@@ -6,11 +6,11 @@ use super::number::number;
 use design_report::Report;
 use design_report::robustness::{LoopPoint, Robustness};
 
-/// A linear-quadratic design is worth a try if its peak of S is below this part of the peak of the design.
+/// Peak of S of a linear-quadratic design, relative to that of the design, below which the page recommends it.
 const BETTER: f64 = 0.9;
 
-/// Returns what to change: a sentence if a check does not hold, then the computed remedies, each change once; without
-/// remedies general advice on peaks of S and on tolerances.
+/// Returns the changes to try: a sentence if a check does not hold, then the computed remedies, each change once;
+/// without remedies general advice on peaks of S and on tolerances.
 pub(super) fn advice(report: &Report) -> Vec<Markup> {
     let mut advice = Vec::new();
     if report.checks.iter().any(|check| !check.holds) {
@@ -46,7 +46,7 @@ pub(super) fn advice(report: &Report) -> Vec<Markup> {
     advice
 }
 
-/// How to lower the peaks of S above `limit`; `None` if there are none.
+/// Describes how to lower the peaks of S above `limit`; `None` without such peaks.
 fn lower_peaks(robustness: &Robustness, limit: f64) -> Option<Markup> {
     let high: Vec<_> = robustness.points.iter().filter(|point| point.judged > limit).collect();
     // The linear-quadratic peak is in the units of the plant file; so is `judged`, unless it is lower than `s_peak`.

@@ -9,7 +9,7 @@ const RIGHT: f64 = 14.0;
 const TOP: f64 = 10.0;
 const BOTTOM: f64 = 48.0;
 
-/// The outer size of a figure, in its own units.
+/// Outer width of a figure in units of its SVG.
 const WIDTH: f64 = 440.0;
 const HEIGHT: f64 = 370.0;
 /// The ends of the horizontal axis.

@@ -153,7 +153,7 @@ pub(super) fn peaks(caption: &str, curves: &[Curve]) -> Markup {
     )
 }
 
-/// Shows a curve; `after`: what changed; `size`: the size of that change in the unit of the curve.
+/// Shows a curve; `after`: what changed; `size`: the size of this change in the unit of the curve.
 pub(super) fn curve<'a>(
     id: String,
     curve: &'a Curve,

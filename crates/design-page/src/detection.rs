@@ -55,7 +55,7 @@ fn decoupled(inputs: &[DecoupledInput]) -> String {
     inputs.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// Says for which parameters of an FMU the means by model errors were computed; empty if none vary.
+/// Names the parameters of an FMU for which the means by model errors were computed; empty if no parameters vary.
 fn examined(section: &Detection) -> Markup {
     let Some(cases) = &section.parameter_cases else { return html! {} };
     html! {

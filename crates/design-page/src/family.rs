@@ -140,7 +140,7 @@ fn tolerance(member: &MemberReport) -> Option<&ToleranceResult> {
     member.margins.as_ref()?.tolerance.as_ref().filter(|test| test.is_examined())
 }
 
-/// The effect of the measurement noise, with a column for each member whose loop is stable; empty without any.
+/// Shows the effect of the measurement noise, with a column for each member with a stable loop; empty without one.
 fn noise(members: &[&MemberReport]) -> Markup {
     let stable: Vec<_> = members
         .iter()
@@ -201,7 +201,7 @@ fn integral_names(report: &Report) -> Vec<String> {
     names.map(|name| format!("integral of {name}")).collect()
 }
 
-/// The names of the states of plant and controller together, of which `p` is a matrix: those of the plant, filtered
+/// The names of the states of plant and controller together, the rows of the matrix `p`: states of the plant, filtered
 /// measurements, estimates, integrals.
 fn loop_names(report: &Report, p: &[Vec<f64>]) -> Vec<String> {
     let states = &report.plant.states;

@@ -112,7 +112,7 @@ fn document(title: &str, identity: &str, body: &Markup) -> String {
     document.into_string().replace(|sign: char| sign.is_control() && sign != '\n', " ")
 }
 
-/// How to use the plots.
+/// Explains how to use the plots.
 fn about_plots() -> Markup {
     html! {
         details.said.stays {
@@ -122,7 +122,7 @@ fn about_plots() -> Markup {
     }
 }
 
-/// A script that is the same in HTML and in XML, where `<` and `&` would otherwise be markup.
+/// A script that is the same in HTML and in XML: as a CDATA section, `<` and `&` are no markup in XML.
 fn script(text: &str) -> Markup {
     html! { script { "/*" (PreEscaped("<![CDATA[")) "*/\n" (PreEscaped(text)) "\n/*" (PreEscaped("]]>")) "*/" } }
 }

@@ -175,7 +175,7 @@ pub(super) fn conditioning<'a>(report: &'a Report) -> Markup {
     }
 }
 
-/// Shows the weights over frequency of these norms; empty without weights.
+/// Shows the weights over frequency of the norms by which gains were designed; empty without weights.
 fn weights(report: &Report) -> Markup {
     let polynomial =
         |all: &[f64]| all.iter().map(|one| format!("{one:.5e}")).collect::<Vec<_>>().join(", ");

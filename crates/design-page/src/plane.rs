@@ -65,8 +65,8 @@ impl Plane {
 /// A required eigenvalue and an actual one; one of them may be missing.
 type Pair = (Option<Pole>, Option<Pole>);
 
-/// Pairs each required eigenvalue of a loop with the nearest remaining actual one, then lists the other actual
-/// eigenvalues.
+/// Pairs each required eigenvalue of a loop with the nearest remaining actual one, then lists the actual eigenvalues
+/// that remain.
 pub(super) fn pairs(system: &Loop) -> Vec<Pair> {
     let mut remaining = system.eigenvalues.clone();
     let mut pairs = Vec::new();

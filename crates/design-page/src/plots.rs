@@ -39,10 +39,10 @@ pub(super) struct Line<'a> {
     pub(super) values: &'a [f64],
 }
 
-/// A plot; in the JSON it is without its numbers.
+/// A plot. The JSON of a plot has no numbers.
 #[derive(Serialize)]
 pub(super) struct Plot<'a> {
-    /// Identifier of its place on the page.
+    /// Identifier of the element of the page that shows the plot.
     pub(super) id: String,
     #[serde(rename = "axis")]
     pub(super) quantity: Quantity,
@@ -50,7 +50,7 @@ pub(super) struct Plot<'a> {
     pub(super) logarithmic: bool,
     /// Label of the vertical axis.
     pub(super) label: &'a str,
-    /// What the plot shows, for screen readers.
+    /// Description of the plot for screen readers.
     pub(super) title: String,
     /// Times in s or frequencies in rad/s; in the JSON the number of points of each curve.
     #[serde(rename = "points", serialize_with = "count")]
@@ -65,7 +65,7 @@ pub(super) struct Plot<'a> {
 pub(super) struct Plots<'a>(Vec<Plot<'a>>);
 
 impl<'a> Plots<'a> {
-    /// Adds a plot and returns its place on the page.
+    /// Adds a plot and returns the element of the page that shows it.
     pub(super) fn add(&mut self, plot: Plot<'a>) -> Markup {
         let place = html! { div.plot id=(plot.id) {} };
         self.0.push(plot);
@@ -79,12 +79,12 @@ impl<'a> Plots<'a> {
     /// Returns the data as JSON without the signs `<` and `&`, for a script element: names and sizes, and the block
     /// of all numbers, compressed (zlib), in base64.
     ///
-    /// All plots of an axis are on one grid, the sorted list of all their times or frequencies, since most of them
-    /// have the same ones. The block has four lists: the grid of the times and the grid of the frequencies (64 bits);
-    /// plot after plot, for each point the difference of its position in the grid from that of the point before, or
-    /// from 0 (32 bits, signed); the values of each curve (64 bits, 32 if there are more than [`DOUBLE`]). A list is
+    /// All plots of an axis are on one grid, the sorted list of all their times or frequencies, since most plots have
+    /// the same times or frequencies. The block has four lists: the grid of the times and the grid of the frequencies
+    /// (64 bits); plot after plot, for each point its position in the grid minus the position of the point before, or
+    /// minus 0 (32 bits, signed); the values of each curve (64 bits, 32 if there are more than [`DOUBLE`]). A list is
     /// stored as all first bytes, little endian, then all second bytes and so on, since neighbours differ little in
-    /// most of them. Points that an axis with decades cannot show are left out.
+    /// most bytes. Points that an axis with decades cannot show are left out.
     pub(super) fn json(&self) -> String {
         let grids = [Quantity::Time, Quantity::Frequency].map(|quantity| self.grid(quantity));
         let mut steps = Vec::new();

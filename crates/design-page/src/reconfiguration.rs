@@ -8,7 +8,7 @@ use super::table::{Cell, Columns, table, table_of};
 use design_report::reconfiguration::{ReconfigurationReport, Reconfigured, ServedByFallback};
 use design_report::robustness::Number;
 
-/// Shows the controllers for actuators that are gone; `plane`: of their eigenvalues.
+/// Shows the controllers for actuators that are gone; `plane`: the plane of the eigenvalues.
 pub(super) fn reconfiguration(section: &ReconfigurationReport, plane: Plane) -> Markup {
     html! {
         p {

@@ -127,7 +127,7 @@ pub(super) fn table_of<'a, T: 'a, const N: usize>(
     table(caption, heads, &items.into_iter().map(row).collect::<Vec<_>>())
 }
 
-/// A name with its unit, if there is one.
+/// A name with its unit, if any.
 pub(super) fn with_unit(name: &str, unit: Option<&String>) -> Cell {
     Cell::Text(unit.map_or_else(|| name.to_owned(), |unit| format!("{name} ({unit})")))
 }

@@ -1,4 +1,4 @@
-//! The first screen: the verdict, its reasons, what to change, and the most important numbers.
+//! The first screen: the verdict, its reasons, changes to try, and the most important numbers.
 
 use maud::{Markup, html};
 
@@ -81,7 +81,7 @@ fn limits(report: &Report) -> Markup {
     }
 }
 
-/// The three most important figures: of the robustness, or without it the slowest eigenvalues and the settling time.
+/// The three most important figures: of the robustness, or, if it is missing, slowest eigenvalues and settling time.
 fn figures(report: &Report) -> Markup {
     let plane = Plane::of(report);
     let Some(robustness) = &report.robustness else {

@@ -12,7 +12,7 @@ use crate::robustness::Verdict;
 pub struct Comparison {
     /// Name of the plant file.
     pub plant_file: String,
-    /// The laws, those that do not exist with the reason.
+    /// The laws. A law that does not exist has the reason.
     pub laws: Vec<LawResult>,
     /// The text that every file about this plant contains.
     #[serde(skip)]
@@ -25,13 +25,13 @@ pub struct Comparison {
 /// A law on the plant.
 #[derive(Serialize)]
 pub struct LawResult {
-    /// Its name in the plant file.
+    /// Name of the law in the plant file.
     pub law: String,
-    /// Its authors.
+    /// Authors of the law.
     pub sources: String,
     /// Why the law does not exist, in a sentence; none if it exists.
     pub reason: Option<String>,
-    /// Its results on this plant; none if the law does not exist.
+    /// Results of the law on this plant; none if the law does not exist.
     pub result: Option<LawFigures>,
 }
 

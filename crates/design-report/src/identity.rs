@@ -1,4 +1,4 @@
-//! The identity of a design: the text with which a file names the plant that it was written for.
+//! The identity of a design: the text by which a file names the plant for which it was written.
 
 use crate::Report;
 use crate::robustness::Verdict;

@@ -3,8 +3,8 @@
 /// Takes the place of an infinite number and its unit in a sentence, where nothing limits the quantity.
 pub const NO_LIMIT: &str = "no limit";
 
-/// Describes when a response stays within its band, with the time formatted by `number`; `time` is infinite if it
-/// leaves the band to the end of its trace.
+/// Describes when a response stays within its band, with the time formatted by `number`; `time` is infinite if the
+/// response is outside the band at the end of its trace.
 #[must_use]
 pub fn settled(time: f64, number: impl Fn(f64) -> String) -> String {
     if time.is_finite() {

@@ -58,7 +58,7 @@ pub struct Remedy {
 }
 
 impl Verdict {
-    /// Adds a reason; the level becomes the worse one of the present level and `level`.
+    /// Adds a reason; the level of the verdict becomes the worse one of the present level and `level`.
     pub fn add(&mut self, level: Level, reason: String) {
         self.level = self.level.max(level);
         self.reasons.push(reason);

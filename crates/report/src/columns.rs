@@ -10,7 +10,7 @@ use serde::Serialize;
 /// Level of the compression, from 0 to 10.
 const LEVEL: u8 = 6;
 
-/// The columns of a page, by number. Equal columns, as those of connected variables, have the same number.
+/// The columns of a page, by number. Equal columns, such as columns of connected variables, have the same number.
 #[derive(Default, Serialize)]
 #[serde(transparent)]
 pub(crate) struct Columns {

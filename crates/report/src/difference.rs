@@ -22,7 +22,7 @@ pub struct Difference {
     pub at: f64,
     /// The root of the mean square over [`Difference::rows`].
     pub rms: f64,
-    /// The number of rows that were compared: those at which one of the runs has a value.
+    /// Number of the compared rows, at which at least one of the runs has a value.
     pub rows: u64,
     /// The largest absolute difference, divided by the range of the variable in both runs; 0 if the runs are
     /// equal, infinite if they differ and the range is 0.
@@ -37,7 +37,7 @@ pub struct Comparison {
     pub differences: Vec<Difference>,
     /// Variables that only this run has.
     pub only_here: Vec<String>,
-    /// Variables that only the other run has; empty if variables were chosen.
+    /// Variables that only the other run has; empty if the user chose variables.
     pub only_there: Vec<String>,
     /// Variables of this run that are texts, which are not compared.
     pub texts: Vec<String>,
@@ -94,7 +94,7 @@ pub(crate) struct ComparisonResult {
     pub(crate) comparison: Comparison,
     /// Whether the other run has each of the columns.
     pub(crate) common: Vec<bool>,
-    /// [`Difference::relative`] of each column; 0 for a column that the other run lacks.
+    /// [`Difference::relative`] of each column; 0 for a column without a counterpart in the other run.
     pub(crate) relative: Vec<f64>,
 }
 
@@ -178,7 +178,7 @@ pub(crate) fn missing(table: &Table, positions: &[usize], other: &Table) -> Vec<
     names.filter(is_missing).cloned().collect()
 }
 
-/// Number of rows of the other run that its thread sends at once.
+/// Number of rows of the other run that the reading thread sends at once.
 const BATCH: usize = 1024;
 /// Largest number of batches of rows that wait for the comparison.
 const BATCHES: usize = 8;
@@ -240,7 +240,7 @@ impl Series {
 
     /// Advances to `time`, which must not decrease from call to call. Returns the position of `time` between the rows
     /// `before` (0) and `next` (1), `None` outside of the run. If several rows have this time, each further call with
-    /// it advances by one of them.
+    /// this time advances by one row.
     #[expect(clippy::float_cmp, reason = "rows of the same time")]
     fn advance_to(&mut self, time: f64) -> Option<f64> {
         let is_first = self.requested.is_none();
@@ -287,9 +287,9 @@ impl Series {
 /// Collects the difference of a variable row by row.
 struct Sum {
     name: String,
-    /// Whether the variable keeps its value between two rows.
+    /// Whether the variable keeps its value between two rows, so that it is not interpolated.
     is_held: bool,
-    /// The largest absolute difference and its time.
+    /// The largest absolute difference and the time of this difference.
     largest: (f64, f64),
     /// Sum of the squares of the differences.
     squares: f64,

@@ -12,7 +12,7 @@ const ERROR: u32 = 0x2000_0000;
 
 /// The frames with one identifier on one bus.
 pub(crate) struct Message {
-    /// Bus and identifier, as in the file.
+    /// Bus and identifier of the message, in the spelling of the trace file.
     pub(crate) name: String,
     /// Number of frames.
     pub(crate) count: usize,

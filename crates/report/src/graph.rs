@@ -15,8 +15,8 @@ const EDGE: usize = 12;
 /// Largest number of characters of a name in a box.
 const LETTERS: usize = 20;
 
-/// Draws the system. An FMU is to the right of the FMUs that it depends on; arrows that close a loop return below the
-/// boxes. The tooltip of an arrow lists its connections.
+/// Draws the system. Each FMU is to the right of the FMUs on which it depends; arrows that close a loop return below
+/// the boxes. The tooltip of an arrow lists the connections of the arrow.
 pub(crate) fn graph(run: &Run) -> Markup {
     let mut arrows: BTreeMap<(usize, usize), Vec<&Connection>> = BTreeMap::new();
     for connection in &run.connections {
@@ -109,7 +109,7 @@ fn short(name: &str) -> String {
     name.chars().take(LETTERS - 1).chain(['…']).collect()
 }
 
-/// Returns the column of each FMU: the length of the longest path to it from an FMU without predecessors, over
+/// Returns the column of each FMU: the length of the longest path to the FMU from an FMU without predecessors, over
 /// connections that close no loop in a depth-first search.
 fn columns(count: usize, arrows: &BTreeMap<(usize, usize), Vec<&Connection>>) -> Vec<usize> {
     let mut order =

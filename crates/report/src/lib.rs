@@ -34,7 +34,7 @@ pub const VARIABLES: usize = 300;
 /// Largest number of marks of each kind on the time axis.
 const MARKS: usize = 1000;
 
-/// What a report shows.
+/// The request for a report: its input files and the selected part.
 #[derive(Debug)]
 pub struct Request<'a> {
     /// The results file, of a format that [`Table`] reads.
@@ -50,7 +50,7 @@ pub struct Request<'a> {
     pub units: &'a [(String, String)],
     /// A trace of the buses in the form of candump, whose frames are shown.
     pub bus_trace: Option<&'a Path>,
-    /// The run, if it is known.
+    /// The properties of the run, if known.
     pub run: Option<&'a Run>,
 }
 
@@ -67,9 +67,9 @@ pub struct Run {
     pub connections: Vec<Connection>,
     /// The names of the outputs, such as `plant.x_p`.
     pub outputs: Vec<String>,
-    /// The names of connected inputs on which a fault acts, so that they differ from their sources.
+    /// Names of the connected inputs on which a fault acts, so that their values differ from the connected outputs.
     pub disturbed: Vec<String>,
-    /// The variables whose plot the configuration asks for, by name or pattern.
+    /// Variables, by name or pattern, whose plot the configuration requests.
     pub plotted: Vec<String>,
     /// Sentences on the algorithm and the reason of each setting.
     pub algorithm: Vec<String>,
@@ -95,9 +95,9 @@ pub struct Mark {
     pub kind: MarkKind,
     /// Time or start of the event in s.
     pub time: f64,
-    /// End of the event in s, if it lasts.
+    /// End of the event in s; `None` for an instant.
     pub end: Option<f64>,
-    /// What happened.
+    /// Description of the event.
     pub text: String,
 }
 
@@ -213,7 +213,7 @@ pub fn identity(results: &Path) -> String {
 ///
 /// At most [`VARIABLES`] variables are shown; the page says how many are left out. The plots have all rows, unless
 /// these are more than two million values; then each plot says how many of the rows it has. Files are read row by row
-/// (the first one twice: for the statistics, then for the plots), so that the memory does not depend on their length.
+/// (the first one twice: for the statistics, then for the plots), so that long files need no more memory.
 ///
 /// # Errors
 ///
@@ -380,10 +380,10 @@ fn read(view: &View<'_>, request: &Request<'_>) -> Result<FirstPass, Error> {
     }
 }
 
-/// The times that occur in several consecutive rows, as at events.
+/// The times that occur in several consecutive rows, such as the times of events.
 #[derive(Default)]
 struct Events {
-    /// The first [`MARKS`] of these times.
+    /// The first [`MARKS`] times of this kind.
     times: Vec<f64>,
     /// The number of all such times.
     count: usize,

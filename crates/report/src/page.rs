@@ -30,7 +30,7 @@ const OPEN: usize = 10;
 /// The range of all times.
 const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
-/// The content of a page, except its plots.
+/// The content of a page except the plots.
 pub(crate) struct Content<'a> {
     pub(crate) request: &'a Request<'a>,
     pub(crate) columns: &'a [Column],
@@ -187,7 +187,7 @@ fn marks(run: Option<&Run>) -> Vec<Mark> {
     marks
 }
 
-/// A table that is folded if `count`, the number of its rows, is larger than [`OPEN`].
+/// A table that is folded if its number of rows, `count`, is larger than [`OPEN`].
 fn folded(count: usize, summary: &str, table: &Markup) -> Markup {
     html! { details open[count <= OPEN] { summary { (summary) } (table) } }
 }
@@ -242,7 +242,7 @@ fn timeline(marks: &[Mark], events: &Events) -> Markup {
     }
 }
 
-/// The variables that do not change, with their values.
+/// Shows the constant variables with their values.
 fn unchanged(content: &Content<'_>) -> Markup {
     let count = content.flat.len();
     html! {
@@ -292,7 +292,7 @@ fn controls(other: Option<&str>) -> Markup {
     }
 }
 
-/// Returns the command for a page of the same files, quoted for a shell. It omits range, variables, units and trace.
+/// Returns the command for a page of the same files, quoted for a shell, without range, variables, units and trace.
 fn command(request: &Request<'_>) -> String {
     let is_plain = |sign: char| sign.is_ascii_alphanumeric() || "_-./".contains(sign);
     let quoted = |path: &Path| {

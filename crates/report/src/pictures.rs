@@ -44,7 +44,7 @@ struct Curve<'a> {
 }
 
 impl<'a> Curve<'a> {
-    /// Creates a curve of these rows: stairs for a variable that keeps its value between two rows.
+    /// Creates a curve of `values` at the times `time`: stairs for a variable that keeps its value between two rows.
     fn new(column: &'a Column, time: &'a [f64], values: &'a [f64]) -> Self {
         let (time, values) = if is_held(column) {
             let (time, values) = stairs(time, values);

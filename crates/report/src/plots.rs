@@ -15,7 +15,7 @@ const CURVES: usize = 7;
 const VALUES: usize = 2_000_000;
 /// Least number of blocks of rows of a plot.
 const BLOCKS: usize = 300;
-/// Largest ratio of the sizes of two curves in a plot; beyond it, the smaller one would look like a straight line.
+/// Largest ratio of the sizes of two curves in a plot; with a larger one, the smaller curve looks like a straight line.
 const RATIO: f64 = 30.0;
 /// Largest number of plots that are not folded.
 const SHOWN: usize = 6;
@@ -36,7 +36,7 @@ pub(crate) struct Group {
 }
 
 impl Group {
-    /// Whether the group is among the first: its variables are plotted by the configuration, connected or outputs.
+    /// Whether the group is shown first: the configuration plots its variables, or these are connected or outputs.
     fn is_first(&self) -> bool {
         self.key.0 < Rank::Other
     }
@@ -135,14 +135,14 @@ struct Curve {
     /// Whether the points are not connected.
     dots: bool,
     values: usize,
-    /// The values of the other run at the same times, if it has the variable.
+    /// The values of the other run at the same times, if the other run has the variable.
     other: Option<usize>,
 }
 
 impl Plots {
     /// Adds the plots of the groups. The samples of a group have the columns of this run, then those of the other run;
     /// `is_compared` says which variables the other run has. Of the first [`SHOWN`] plots, those with
-    /// [`Group::is_first`] are not folded; if no group has it, none of them is folded.
+    /// [`Group::is_first`] are not folded; if no group has this property, no plot is folded.
     pub(crate) fn add_all(
         &mut self,
         groups: &[(&Group, &Samples)],

@@ -4,7 +4,7 @@
 #[derive(Debug, Default)]
 pub(crate) struct Samples {
     pub(crate) time: Vec<f64>,
-    /// The values of each column, as many as there are times.
+    /// For each column, a value at each of the times.
     pub(crate) columns: Vec<Vec<f64>>,
     /// The number of all rows of the run; the samples may have fewer.
     pub(crate) total: usize,
@@ -13,8 +13,8 @@ pub(crate) struct Samples {
 /// Collects the rows of a plot one by one.
 ///
 /// Of each block of consecutive rows, keeps the rows at which a column, or the difference of a pair of columns, is
-/// lowest or highest, and the first and the last row at which it has no finite value. Also keeps the first and the last
-/// row of the run.
+/// lowest or highest, and the first and the last row at which this column or difference has no finite value. Also keeps
+/// the first and the last row of the run.
 pub(crate) struct Collector {
     /// The rows that are kept.
     samples: Samples,
@@ -91,7 +91,7 @@ impl Collector {
 }
 
 /// Returns the rows with the lowest and the highest finite value, and the first and the last row without a finite
-/// value; `None` for a row that does not exist, and for the last if it is the first.
+/// value; `None` for a row that does not exist, and for the last one if it equals the first.
 fn extremes(values: impl Iterator<Item = f64> + Clone) -> [Option<usize>; 4] {
     let finite = || values.clone().enumerate().filter(|(_, value)| value.is_finite());
     let lowest = finite().min_by(|one, other| one.1.total_cmp(&other.1));

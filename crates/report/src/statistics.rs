@@ -11,9 +11,9 @@ pub struct Statistics {
     pub first: f64,
     /// The last finite value.
     pub last: f64,
-    /// The smallest value, and the first time in s at which the variable has it.
+    /// The smallest value, and the first time in s of this value.
     pub smallest: (f64, f64),
-    /// The largest value, and the first time in s at which the variable has it.
+    /// The largest value, and the first time in s of this value.
     pub largest: (f64, f64),
     /// The mean over [`Statistics::basis`].
     pub mean: f64,
@@ -31,11 +31,11 @@ pub enum Basis {
     /// Time, of this length in s: the integral by the trapezoidal rule (integers and Booleans are held), divided by the
     /// length.
     Time(f64),
-    /// This number of finite values, each with the same weight: some rows have none, or the time does not advance.
+    /// The given number of finite values, equally weighted, because some rows have none or the time does not advance.
     Values(u64),
 }
 
-/// Factor by which values are scaled for the scaled squares, which do not overflow.
+/// Factor by which values are scaled before they are squared, so that the squares do not overflow.
 pub(crate) const SCALE: f64 = 1e-163;
 
 /// Returns the root of a mean of squares; if `square` overflowed, computes it from the mean of scaled squares.
@@ -46,7 +46,7 @@ pub(crate) fn root(square: f64, scaled_square: f64) -> f64 {
 /// Collects the statistics of a variable row by row.
 pub(crate) struct Builder {
     statistics: Statistics,
-    /// Whether the variable keeps its value between two rows.
+    /// Whether the variable keeps its value between two rows, which determines how its integrals are computed.
     is_held: bool,
     /// Time and value of the last finite row.
     before: Option<(f64, f64)>,

@@ -61,7 +61,7 @@ impl CsvSink {
         Ok(sink)
     }
 
-    /// Verifies the file and appends the lines. After a failure they stay in the buffer.
+    /// Verifies the file and appends the lines. After a failure the lines stay in the buffer.
     fn write_rows(&mut self) -> Result<(), ResultsError> {
         self.file.verify()?;
         if self.lines.bytes().is_empty() {

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A communication point counts as at an instant of the grid if it precedes the instant by less than this
-/// fraction of the interval plus the rounding of start and time.
+/// A communication point that precedes an instant of the grid by less than this fraction of the interval, plus the
+/// rounding of start and time, counts as at the instant.
 const TOLERANCE: f64 = 1e-9;
 
 /// The communication points to record.
@@ -15,12 +15,12 @@ pub enum Decimation {
     /// The first communication point at or after each instant `start + k interval`; interval in s, above
     /// zero. A step over several instants gives one row.
     Every(f64),
-    /// The first communication point and every n-th after it; n above zero.
+    /// The first communication point and every n-th one after the first; n above zero.
     Nth(u64),
 }
 
-/// Decides for each communication point whether it is recorded. Serialisable, so that a resumed run
-/// records the same points.
+/// Decides for each communication point whether a row is recorded. Serialisable, so that a resumed run records the same
+/// points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Due {
     decimation: Decimation,
@@ -39,8 +39,8 @@ impl Due {
         Self { decimation, start, next: 0.0, points: 0 }
     }
 
-    /// Whether the communication point at `time` in s is recorded. Call it once for each communication
-    /// point, in their order.
+    /// Whether the communication point at `time` in s is recorded. Call it once for each communication point, in the
+    /// order of time.
     pub fn at(&mut self, time: f64) -> bool {
         match self.decimation {
             Decimation::All => true,

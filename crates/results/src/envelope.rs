@@ -93,8 +93,8 @@ impl Envelope {
             pairs.map(|pair| pair.iter().fold(EMPTY, |all, one| all.merge(*one))).collect();
     }
 
-    /// Returns the times and the values of the samples. One NaN, at the time of the first, represents all values of a
-    /// bucket that are not finite; it is after the other samples of the bucket, even if they are later.
+    /// Returns the times and the values of the samples. One NaN represents all values of a bucket that are not finite.
+    /// It has the time of the first of them, but follows the other samples of the bucket even if these are later.
     #[must_use]
     pub fn samples(&self) -> (Vec<f64>, Vec<f64>) {
         let (mut times, mut values) = (Vec::new(), Vec::new());

@@ -1,5 +1,5 @@
-//! Shared memory that describes the results file of this process to a supervising process: its path, the length
-//! that is written, and the rows that are not written yet. With it, the supervisor completes the file if this process
+//! Shared memory that describes the results file of this process to a supervising process: its path, the length that is
+//! written, and the rows that are not written yet. The supervisor completes the file by this memory if this process
 //! dies.
 
 use std::fs::File;
@@ -50,8 +50,8 @@ pub fn share(memory: &'static [AtomicU64]) {
 pub(crate) struct Ledger(&'static [AtomicU64]);
 
 impl Ledger {
-    /// Enters a new file at this absolute path; `None` if there is no shared memory, another file has it, or the path
-    /// is too long.
+    /// Enters a new file at this absolute path; `None` if there is no shared memory, another file uses the memory, or
+    /// the path is too long.
     pub(crate) fn enter(path: &Path, identity: Identity) -> Option<Self> {
         let memory = SHARED.get()?;
         let path = path.as_os_str().as_encoded_bytes();
@@ -80,8 +80,8 @@ impl Ledger {
         }
     }
 
-    /// Stores the pending `rows`, of which the memory already has the bytes before `start`. Returns false if they do
-    /// not fit: then they must be written to the file.
+    /// Stores the pending `rows`, of which the memory already has the bytes before `start`. Returns false if the rows
+    /// do not fit and must therefore be written to the file.
     #[inline]
     pub(crate) fn keep(self, rows: &[u8], start: usize) -> bool {
         let fits = rows.len() <= (self.0.len() - ROWS) * WORD;
@@ -123,9 +123,9 @@ fn bytes(words: &[AtomicU64], length: u64) -> Vec<u8> {
 pub struct LeftFile {
     /// The absolute path of the file.
     pub path: PathBuf,
-    /// Whether the process had completed it.
+    /// Whether the process had completed the file.
     pub was_complete: bool,
-    /// What is wrong with the file; `None` if it has all rows.
+    /// Description of the damage; `None` if the file has all rows.
     pub damage: Option<String>,
 }
 
@@ -161,7 +161,7 @@ fn path_of(bytes: Vec<u8>) -> PathBuf {
 }
 
 /// Appends `rows`, or their missing part, to the file at `path`, which must still have this identity and the `length`
-/// bytes that were written. Returns what is wrong with the file; `None` if it has all rows.
+/// bytes that were written. Returns a description of the damage; `None` if the file has all rows.
 fn append(
     path: &Path,
     identity: Identity,

@@ -58,8 +58,8 @@ pub enum ColumnKind {
     Real,
     /// `fmi2Integer`, Enumerations, and the integer types of FMI 3.0 that fit into 32 bits with a sign.
     Integer,
-    /// Integers that need 64 bits: `Int64`, `UInt64`, `UInt32`, and Enumerations with an item beyond 32 bits. Their
-    /// values are among [`Row::integers`].
+    /// Integers that need 64 bits: `Int64`, `UInt64`, `UInt32`, and Enumerations with an item beyond 32 bits. The
+    /// values are in [`Row::integers`].
     Long,
     /// `fmi2Boolean`.
     Boolean,
@@ -138,7 +138,7 @@ pub enum ResultsError {
         /// The name of both columns.
         name: String,
     },
-    /// The number of values of a type in a row differs from the number of its columns.
+    /// The number of values of a type in a row differs from the number of columns of this type.
     #[error("a row has {actual} values of type {kind:?}, expected {expected}")]
     Values {
         /// Type of the values; Integer stands for Integer and Long.
@@ -258,8 +258,8 @@ pub enum ResultsError {
     },
 }
 
-/// Creates a result file, and its folder if that is missing. The extension `.csv` or `.parquet` selects
-/// the format. A pipe or a device takes CSV only, and needs no extension.
+/// Creates a result file, and the folder of the file if the folder is missing. The extension `.csv` or `.parquet`
+/// selects the format. A pipe or a device takes CSV only, and needs no extension.
 ///
 /// # Errors
 ///

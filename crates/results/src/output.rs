@@ -22,15 +22,15 @@ pub use stream::reserve_standard_output;
 /// Path of standard output; [`super::create`] writes CSV to it.
 pub const STANDARD_OUTPUT: &str = "/dev/stdout";
 
-/// Smallest descriptor number of a results file, if the process may have it. An FMU that closes descriptors of
-/// others usually closes those with small numbers.
+/// Smallest descriptor number of a results file, if the limit of the process allows this number. An FMU that closes
+/// descriptors of others usually closes those with small numbers.
 #[cfg(unix)]
 const DESCRIPTOR: i32 = 512;
 
 /// An open file with the length that its writer expects.
 #[derive(Debug)]
 pub(super) struct OutputFile {
-    /// The path as it was given, for messages.
+    /// The path as the caller stated it, for messages.
     path: PathBuf,
     /// The absolute path, which is valid after a change of the current folder.
     absolute: PathBuf,
@@ -44,7 +44,7 @@ pub(super) struct OutputFile {
     ledger: Option<Ledger>,
     /// Whether the file was opened again; a warning is logged the first time.
     reopened: bool,
-    /// The changes of the file, if a test collects them.
+    /// The changes of the file, for tests that collect them.
     #[cfg(test)]
     pub(super) changes: Option<Vec<Change>>,
 }
@@ -58,8 +58,8 @@ pub(super) enum Change {
 }
 
 impl OutputFile {
-    /// Creates an empty file, and its folder if that is missing, and locks it against other runs; or opens a pipe or
-    /// a device.
+    /// Creates an empty file, and its folder if the folder is missing, and locks the file against other runs; or opens
+    /// a pipe or a device.
     pub(super) fn create(path: &Path) -> Result<Self, ResultsError> {
         let failed = |source| ResultsError::Write { path: path.to_owned(), source };
         #[cfg(unix)]
@@ -210,8 +210,8 @@ impl OutputFile {
         Ok(())
     }
 
-    /// Empties a file whose start cannot be written, or removes it if that fails, too. The caller reports the error
-    /// of the write.
+    /// Empties a file whose start cannot be written, or removes the file if it cannot be emptied either. The caller
+    /// reports the error of the write.
     pub(super) fn abandon(mut self) {
         if self.set_length(0).is_err() && self.regular {
             let _ = fs::remove_file(&self.absolute);

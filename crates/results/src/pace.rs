@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 /// Largest number of rows between two readings of the clock.
 const STRIDE: u32 = 256;
 
-/// A timer of an interval of wall-clock time. If rows arrive fast, it reads the clock only for some of them,
+/// A timer of an interval of wall-clock time. If rows arrive fast, the timer reads the clock only for some rows,
 /// because a reading takes as long as writing several cells.
 #[derive(Debug)]
 pub(super) struct Pace {
@@ -24,7 +24,7 @@ impl Pace {
         Self { interval, last_write: now, last_reading: now, left: 1, stride: 1 }
     }
 
-    /// Counts a row. Returns true if the interval has passed since it last returned true.
+    /// Counts a row. Returns true if the interval has passed since the last true result.
     pub(super) fn due(&mut self) -> bool {
         self.left -= 1;
         if self.left > 0 {

@@ -36,17 +36,17 @@ const PAGE: usize = 1 << 20;
 /// A sink that writes Parquet: `time` and Real as DOUBLE, Integer as INT32, Long as INT64, Boolean as BOOLEAN,
 /// String as UTF-8; only values of clocked columns can be null. The footer's metadata contains the units.
 ///
-/// Rows are collected in a block of bounded size, which becomes a row group. A partly filled block is
-/// written again by the next write. The file is readable at every instant, also if the process is
-/// killed during a write or the disk is full: then it has the rows of the last complete write. Until it
-/// is finished it may have unused bytes between the row groups, at most 48 MiB.
+/// Rows are collected in a block of bounded size, which becomes a row group. A partly filled block is written again by
+/// the next write. The file is readable at every instant, also if the process is killed during a write or the disk is
+/// full: then it has the rows of the last complete write. An unfinished file may have unused bytes between the row
+/// groups, at most 48 MiB.
 #[derive(Debug)]
 pub struct ParquetSink {
     tail: Tail,
     widths: Widths,
     properties: Arc<WriterProperties>,
     footer: Footer,
-    /// For each column of the file, its number among the clocked columns; `None` if it is not clocked.
+    /// For each column of the file, its number among the clocked columns; `None` for a column that is not clocked.
     clocked: Vec<Option<usize>>,
     block: Block,
     /// End of the row groups of full blocks.
@@ -87,8 +87,8 @@ impl ParquetSink {
         })
     }
 
-    /// Writes the rows of the block and the footer, unless the file has them already; starts the next block if this
-    /// one is full. With `last`, it also moves the tail so that the file has no unused bytes.
+    /// Writes the rows of the block and the footer, unless the file has them already; starts the next block if this one
+    /// is full. With `last`, also moves the tail so that the file has no unused bytes.
     fn write_rows(&mut self, last: bool) -> Result<(), ResultsError> {
         self.tail.file.verify()?;
         let (rows, full) = (self.block.rows, self.block.is_full());
@@ -195,8 +195,8 @@ impl Drop for ParquetSink {
     }
 }
 
-/// Returns for each column of the file, of which the time is the first, its number among the clocked columns;
-/// `None` if it is not clocked.
+/// Returns for each column of the file, of which the time is the first, its number among the clocked columns; `None`
+/// for a column that is not clocked.
 fn clocked(columns: &[Column]) -> Vec<Option<usize>> {
     let mut count = 0..;
     let number = |column: &Column| if column.clocked { count.next() } else { None };

@@ -64,9 +64,9 @@ impl Table {
     }
 
     /// Returns the columns in the order of the file, including the time; in MAT files, columns that vary come first.
-    /// Columns of CSV and MAT files have the type Real, integers of Parquet the type Integer, also those with 64 bits;
-    /// its decimals and timestamps, which are in s, have the type Real. Columns of CSV have no unit, unless the second
-    /// line of the file states units.
+    /// Columns of CSV and MAT files have the type Real, integers of Parquet the type Integer, also integers with 64
+    /// bits; decimals and timestamps (in s) of Parquet have the type Real. Columns of CSV have no unit, unless the
+    /// second line of the file states units.
     #[must_use]
     pub fn columns(&self) -> &[Column] {
         &self.columns
@@ -98,7 +98,7 @@ impl Table {
     /// # Errors
     ///
     /// [`ResultsError::Number`] if a cell is no number, [`ResultsError::Text`] if a column contains texts,
-    /// [`ResultsError::Order`] if a time is earlier than the one before, [`ResultsError::Read`] if the file cannot be
+    /// [`ResultsError::Order`] if a time is earlier than the time before, [`ResultsError::Read`] if the file cannot be
     /// read, a time is no finite number, or several columns have the name of a requested one. The function was then
     /// called for some rows before the error.
     ///

@@ -26,7 +26,7 @@ pub enum SelectionError {
     NoMatch {
         /// The pattern.
         pattern: String,
-        /// Similar names, otherwise the first names, as the end of the message.
+        /// Similar names, or the first names if none is similar, as the end of the message.
         near: String,
     },
     /// `exclude` excludes every included variable.
@@ -117,8 +117,8 @@ fn matches_pattern(pattern: &[char], name: &str) -> bool {
 /// Largest edit distance of two similar names.
 const EDITS: usize = 2;
 
-/// Returns up to [`SHOWN`] of `names` that contain `name`, are contained in it, or have an edit distance of
-/// at most [`EDITS`], the most similar first.
+/// Returns up to [`SHOWN`] of `names` that contain `name`, are contained in `name`, or have an edit distance of at most
+/// [`EDITS`] to it, the most similar first.
 fn similar<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str> {
     let edits = |known: &str| strsim::levenshtein(&known.to_lowercase(), &name.to_lowercase());
     let near = |known: &&str| {

@@ -14,7 +14,7 @@ const INTEGER: usize = 20;
 pub(super) struct Lines {
     bytes: Vec<u8>,
     used: usize,
-    /// Largest length of a row without its texts.
+    /// Largest length in bytes of a row without its texts.
     row: usize,
 }
 
@@ -38,7 +38,7 @@ impl Lines {
         self.used = 0;
     }
 
-    /// Reserves memory for a line with these texts.
+    /// Reserves memory for a line with the given texts.
     pub(super) fn begin<'a>(&mut self, texts: impl Iterator<Item = &'a str>) {
         let texts: usize = texts.map(|text| 2 * text.len() + 3).sum();
         let room = self.row + texts;

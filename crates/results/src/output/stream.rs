@@ -19,10 +19,10 @@ const READER: Duration = Duration::from_secs(10);
 const ATTEMPTS: Duration = Duration::from_millis(50);
 /// Time for which a pipe must be full before a warning is logged.
 const FULL: Timespec = Timespec { tv_sec: 5, tv_nsec: 0 };
-/// Number of bytes that a pipe always takes in one write if it takes any.
+/// Number of bytes that a pipe takes completely in one write, or not at all.
 const ATOMIC: usize = 4096;
 
-/// Standard output, once it is reserved for the results.
+/// Standard output, after its reservation for the results.
 static RESERVED: Mutex<Option<File>> = Mutex::new(None);
 
 /// Reserves standard output for the results: text that this process and its FMUs print goes to standard
@@ -75,7 +75,7 @@ pub(super) fn open(path: &Path) -> io::Result<Option<File>> {
     }
 }
 
-/// Writes to a pipe or a device, and logs a warning each time that it takes nothing for [`FULL`].
+/// Writes to a pipe or a device, and logs a warning each time that the pipe or device takes nothing for [`FULL`].
 pub(super) fn write(file: &mut File, bytes: &[u8], path: &Path) -> io::Result<()> {
     for part in bytes.chunks(ATOMIC) {
         let mut events = [PollFd::new(&*file, PollFlags::OUT)];

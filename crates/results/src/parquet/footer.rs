@@ -55,7 +55,7 @@ impl Footer {
         Ok(Self { schema, metadata, groups: Vec::new() })
     }
 
-    /// Renders the footer with all row groups so far, and with `last` behind them in this footer only.
+    /// Renders the footer with all row groups so far, and with `last` after these groups in this footer only.
     pub(super) fn render(
         &mut self,
         last: Option<RowGroupMetaData>,

@@ -1,18 +1,18 @@
 //! The end of a Parquet file: its last row group and its footer, replaced so that the file is readable
 //! at every instant, whenever the process is killed.
 //!
-//! The last eight bytes of a file are the length L of the footer and `PAR1`. A reader takes the L bytes
-//! before them, decodes the metadata at their start, and ignores what follows the metadata. So one
-//! write of eight bytes, at a multiple of eight, replaces one footer by another. A kill can cut a longer
-//! write between two pages of memory, but not this one.
+//! The last eight bytes of a file are the length L of the footer and `PAR1`. A reader takes the L bytes before these
+//! eight, decodes the metadata at their start, and ignores what follows the metadata. So one write of eight bytes, at a
+//! multiple of eight, replaces one footer by another. A kill can cut a longer write between two pages of memory, but
+//! not this one.
 //!
-//! A new tail behind the present one first gets its last eight bytes, with the L that leads to the
-//! present footer; then all bytes before them; then its own L. A new tail that fits in front of the
-//! present one is written, and the file is then cut behind it.
+//! A new tail behind the present one first gets its last eight bytes, with the L that leads to the present footer; then
+//! all bytes before these eight; then its own L. A new tail that fits in front of the present one is written, and the
+//! file is then cut behind it.
 
 use super::{MAGIC, OutputFile, ResultsError};
 
-/// Number of bytes of the footer length and [`MAGIC`] at the end of a file. Each tail ends at a multiple of it.
+/// Number of bytes of the footer length and [`MAGIC`] at the end of a file. Each tail ends at a multiple of `LINK`.
 const LINK: usize = 8;
 
 /// A file with a footer.

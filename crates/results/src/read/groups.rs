@@ -161,8 +161,8 @@ fn visit_group(
     }
 }
 
-/// Replaces `cells` by the next cells of a column as numbers, none after the last row. `is_unsigned`: its integers
-/// have no sign. A column of texts is an error.
+/// Replaces `cells` by the next cells of a column as numbers, none after the last row. `is_unsigned`: the integers of
+/// the column have no sign. A column of texts is an error.
 fn read(
     reader: &mut ColumnReader,
     cells: &mut Vec<f64>,

@@ -20,7 +20,7 @@ pub(super) struct Layout {
     delimiter: u8,
     /// Whether the second line has the units of the columns.
     has_units: bool,
-    /// Whether the line of the names ends with a delimiter, as OpenModelica writes it.
+    /// Whether the line of the names ends with a delimiter, as in files of OpenModelica.
     is_closed: bool,
 }
 

@@ -1,10 +1,10 @@
 //! Reads results of Dymola and OpenModelica: MAT files of version 4 with trajectories.
 //!
 //! Such a file has matrices by name. `Aclass` states the layout, `name` and `description` have a text for each
-//! variable. `dataInfo` has four integers for each variable: the matrix with its values (0: the time, 1: `data_1`
-//! with the values that are constant, 2: `data_2` with those that vary), its row there, negative for a variable with
-//! the opposite sign, and how it is interpolated. Only the layout `binTrans` is read, in which `data_2` is written
-//! time by time; both tools write it.
+//! variable. `dataInfo` has four integers for each variable: the matrix with its values (0: the time, 1: `data_1` with
+//! the values that are constant, 2: `data_2` with the values that vary), the row in this matrix, negative for a
+//! variable with the opposite sign, and the kind of interpolation. Only the layout `binTrans` is read, in which
+//! `data_2` is written time by time; both tools write it.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek as _, SeekFrom};
@@ -71,7 +71,7 @@ impl Precision {
 }
 
 impl Matrix {
-    /// Returns the number of bytes; `None` if it overflows.
+    /// Returns the number of bytes; `None` on overflow.
     fn size(&self) -> Option<u64> {
         let count = self.rows.checked_mul(self.columns)?.checked_mul(self.precision.size)?;
         u64::try_from(count).ok()
