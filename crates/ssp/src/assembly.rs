@@ -11,7 +11,7 @@ use slave::Transformation;
 /// A coupled system: FMUs with settings, functions, connections, start and stop time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Assembly {
-    /// Name of the system, if it has one.
+    /// Name of the system; `None` if the file states none.
     pub name: Option<String>,
     /// The FMUs, in the order in which they are instantiated.
     pub elements: Vec<Element>,
@@ -36,7 +36,7 @@ pub struct Element {
     pub shown: Option<PathBuf>,
     /// The archive from which `fmu` was unpacked; ignored unless `fmu` is [`Origin::folder`].
     pub origin: Option<Origin>,
-    /// Values set before the initialization, in this order; later values override earlier ones.
+    /// Values set before the initialization, in this order; of several for the same variable the last one applies.
     pub settings: Vec<Setting>,
     /// The interface of the FMU to use, as stated in a system structure.
     pub implementation: Implementation,
@@ -57,7 +57,7 @@ impl Element {
     }
 }
 
-/// An archive, and the folder with the files unpacked from it, which are those that a simulation on this platform
+/// An archive, and the folder with the files unpacked from this archive: the files that a simulation on this platform
 /// needs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Origin {

@@ -23,7 +23,7 @@ pub(super) struct Measure {
 
 impl Measure {
     /// Creates the measure of a stated type, empty for a type without unit and enumeration. The first of `scopes` that
-    /// has the name of the unit or enumeration defines it.
+    /// has the name of the unit or enumeration defines the unit or enumeration.
     pub(super) fn stated(kind: Option<&Type>, scopes: &[&Definitions]) -> Self {
         match kind {
             Some(Type::Real(Some(unit))) => Measure::unit(unit, scopes),
@@ -68,7 +68,7 @@ impl Measure {
         }
     }
 
-    /// Replaces missing fields by those of `other`.
+    /// Replaces missing fields by the fields of `other`.
     pub(super) fn or(self, other: Measure) -> Self {
         Measure {
             unit: self.unit.or(other.unit),
@@ -85,10 +85,10 @@ impl Measure {
 /// Returns factor and offset that convert values from the unit of `from` to the unit of `to`; both
 /// units satisfy `base = factor * unit + offset`, without the offset for differences.
 ///
-/// The result is (1, 0) if one side has no unit. For units of the same name it is (1, 0), too, unless both are defined,
-/// measure the same quantity and differ in factor or offset. For units of different names it is `None` if a definition
-/// is missing, and an error sentence if the units measure different quantities, or differ by an offset while only one
-/// side is a difference.
+/// The result is (1, 0) if one side has no unit. For units of the same name the result is also (1, 0), unless both are
+/// defined, measure the same quantity and differ in factor or offset. For units of different names the result is `None`
+/// if a definition is missing, and an error sentence if the units measure different quantities, or differ by an offset
+/// while only one side is a difference.
 pub(super) fn between(from: &Measure, to: &Measure) -> Result<Option<(f64, f64)>, String> {
     const SAME: (f64, f64) = (1.0, 0.0);
     let (Some((from_name, from_base)), Some((to_name, to_base))) = (&from.unit, &to.unit) else {

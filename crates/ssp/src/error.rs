@@ -39,7 +39,7 @@ pub enum SspError {
     Limit {
         limit: usize,
         what: &'static str,
-        /// [`fmu_description::limits::HELP`] if the user can lift the limit, otherwise empty.
+        /// [`fmu_description::limits::HELP`] if a limit was exceeded that the user can lift, otherwise empty.
         help: &'static str,
     },
     /// A file, element or variable is missing or unsuitable.

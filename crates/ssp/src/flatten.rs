@@ -29,8 +29,8 @@ pub(super) struct Edge {
 }
 
 impl Edge {
-    /// Appends the conversion of this connection. If an end is a component whose source is another system structure,
-    /// also converts between the unit that the component states for the connector and the unit inside that structure.
+    /// Appends the conversion of the connection to `chain`. If an end is a component whose source is another system
+    /// structure, also converts between the unit that the component states and the unit inside.
     fn convert(&self, tree: &Tree, chain: ConversionChain) -> Result<ConversionChain, String> {
         let outside = |vertex: &Vertex| {
             let stated = (self.system != vertex.node).then(|| tree.measure_outside(vertex));

@@ -30,11 +30,11 @@ struct Place<'a> {
     parent: Option<usize>,
     path: String,
     depth: usize,
-    /// The component that refers to a system, and the file that contains it.
+    /// The component that refers to the system, and the file that contains this component.
     outer: Option<(&'a ElementBase, &'a Rc<File>)>,
 }
 
-/// Reads the SSD or the SSP at `path` and all files that it refers to.
+/// Reads the SSD or the SSP at `path` and all files to which it refers.
 pub(super) fn load(path: &Path, variant: Option<&str>) -> Result<(Tree, Rc<Document>), SspError> {
     let mut loader = Loader::default();
     let document = loader.files.document(&Target {
@@ -249,7 +249,7 @@ impl Loader {
     }
 
     /// Adds a reference to a signal dictionary, which is searched in the parent system, then in the systems around it.
-    /// Returns an error if it is not found.
+    /// Returns an error if the dictionary is not found.
     fn reference(
         &mut self,
         reference: &DictionaryReference,
@@ -273,8 +273,8 @@ impl Loader {
         Ok(node)
     }
 
-    /// Loads the files of the bindings. `component` is the base of URIs relative to the component; if it is `None`, a
-    /// binding with such a URI is an error.
+    /// Loads the files of the bindings. `component` is the base of URIs relative to the component; without `component`,
+    /// a binding with such a URI is an error.
     fn bindings(
         &mut self,
         bindings: &[ParameterBinding],

@@ -22,7 +22,7 @@ use slave::Transformation;
 
 /// Name of the file in a folder.
 const DEFAULT: &str = "OspSystemStructure.xml";
-/// The resolution of time in libcosim in s; steps are multiples of it.
+/// The resolution of time in libcosim in s: steps are multiples of this time.
 const TICK: f64 = 1e-9;
 
 /// Returns whether `path` is a folder with an `OspSystemStructure.xml` and without an SSD.
@@ -55,13 +55,13 @@ struct Loader {
     files: Files,
     assembly: Assembly,
     steps: Vec<(String, f64)>,
-    /// Index of each simulator's FMU in `files`, and the groups of its variables.
+    /// Index of each simulator's FMU in `files`, and the variable groups of this FMU.
     simulators: HashMap<String, (usize, Vec<Group>)>,
     /// The linear transformations by name.
     linear: Vec<(String, Linear)>,
 }
 
-/// A linear transformation with the connections to its ends.
+/// A linear transformation with the connections at its input and its output.
 #[derive(Default)]
 struct Linear {
     factor: f64,
@@ -135,8 +135,8 @@ impl Loader {
         Ok(())
     }
 
-    /// Adds the step of a simulator that states one. As in libcosim, it is rounded down to a multiple of the base step,
-    /// but is at least one base step; a rounded step gives a warning.
+    /// Adds the step of a simulator that states one. As in libcosim, the step is rounded down to a multiple of the base
+    /// step, but is at least one base step; a rounded step gives a warning.
     fn step(&mut self, simulator: &Simulator, base: f64, at: Position) {
         let Some(stated) = simulator.step_size.filter(|stated| *stated > 0.0) else { return };
         let ticks = |time: f64| (time / TICK.min(base)).round();

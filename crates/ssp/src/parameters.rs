@@ -53,14 +53,14 @@ fn depth(tree: &Tree, node: usize) -> usize {
     std::iter::successors(Some(node), |node| tree.nodes[*node].parent).count()
 }
 
-/// Applies the bindings one after the other.
+/// The state while the bindings are applied one after another.
 struct Binder<'a> {
     tree: &'a Tree,
     flow: &'a Flow,
     /// The targets of all connections, by source.
     targets: HashMap<&'a Vertex, Vec<&'a Vertex>>,
     settings: Settings,
-    /// Positions of the settings in the lists of their nodes.
+    /// For the vertex of each setting, the position of the setting in the list of its node.
     positions: HashMap<Vertex, usize>,
     warnings: &'a mut Vec<String>,
 }
@@ -224,7 +224,7 @@ impl Binder<'_> {
     }
 
     /// Sets the start value of the output that drives the connector `target` so that `target` gets `value`. Does
-    /// nothing if no FMU drives it.
+    /// nothing if no FMU drives the connector.
     fn set_upstream(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
         let path = self.flow.upstream(self.tree, target).map_err(|error| error.to_string())?;
         let is_fmu =

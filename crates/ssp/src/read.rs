@@ -19,8 +19,8 @@ use definitions::{conversion, definitions, value_type};
 ///
 /// # Errors
 ///
-/// [`SspError`] with line and column if the file is not well-formed or has content that SSP does not allow;
-/// also if it exceeds a limit.
+/// [`SspError`] with line and column if the file is not well-formed or has content that SSP does not allow; also if the
+/// file exceeds a limit.
 pub fn read_ssd(bytes: &[u8]) -> Result<SystemStructure, SspError> {
     ssd(bytes).map(|(read, _)| read)
 }

@@ -248,8 +248,7 @@ fn parameter_mapping(tag: Tag, mapping: &ParameterMapping) -> Tag {
     entries.versioned()
 }
 
-/// Writes `Enumerations` and `Units` in the namespace of the file, their content in the common
-/// namespace.
+/// Writes `Enumerations` and `Units` in the namespace of the file, and the content of both in the common namespace.
 fn definitions(tag: Tag, space: &str, definitions: &Definitions) -> Tag {
     let enumerations = definitions.enumerations.iter().map(|enumeration| {
         let items = enumeration.items.iter().map(|(name, value)| {

@@ -48,7 +48,7 @@ pub(super) fn check(node: &Node, warnings: &mut Vec<String>) {
     }
 }
 
-/// Warnings, each with the position of its first case and the number of cases.
+/// Warnings, each with the position of its first occurrence and the number of occurrences.
 type Findings = BTreeMap<String, (Position, usize)>;
 
 fn visit(node: &Node, findings: &mut Findings) {
@@ -87,7 +87,7 @@ fn add(findings: &mut Findings, sentence: String, at: Position) {
 /// Lists of element names.
 type Names = &'static [&'static [&'static str]];
 
-/// Returns the allowed children and attributes of an element; `None` if its content is not checked.
+/// Returns the allowed children and attributes of an element; `None` if the content is not checked.
 fn content(name: &str) -> Option<(Names, &'static [&'static str])> {
     Some(match name {
         "SystemStructureDescription" => {

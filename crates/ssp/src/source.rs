@@ -37,7 +37,8 @@ impl Target {
 }
 
 impl Base {
-    /// Returns the base of files at the root of an archive that is unpacked in `folder`; messages name it `shown`.
+    /// Returns the base of files at the root of an archive that is unpacked in `folder`; messages state the path
+    /// `shown`.
     pub(super) fn archive(folder: &Path, shown: &Path) -> Self {
         let (folder, shown) = (folder.to_owned(), shown.to_owned());
         Base { archive: Some(folder.clone()), folder, shown }

@@ -192,7 +192,7 @@ pub struct Connection {
 /// One end of a connection.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct End {
-    /// The element; `None` for the system itself.
+    /// Name of the element; `None` for the system itself.
     pub element: Option<String>,
     /// The connector.
     pub connector: String,
@@ -217,7 +217,7 @@ pub struct Conversion {
     pub suppress_units: bool,
 }
 
-/// A transformation as the file states it (section 4.5.2).
+/// A transformation in the form of the file (section 4.5.2).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Transformation {
     /// `LinearTransformation`: `target = factor source + offset`.
@@ -246,9 +246,9 @@ pub struct ParameterBinding {
 /// Content in the same file or in another file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source<T> {
-    /// In this file.
+    /// Content in this file.
     Inline(T),
-    /// In another file.
+    /// Reference to another file with the content.
     File {
         /// `source`, a URI.
         uri: String,

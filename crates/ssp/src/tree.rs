@@ -1,4 +1,4 @@
-//! The loaded system structure: all elements of all files and the FMUs that they refer to.
+//! The loaded system structure: all elements of all files and the FMUs to which these refer.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -48,7 +48,7 @@ pub(super) struct Node {
     pub(super) connectors: Vec<Connector>,
     /// Positions of the connectors by name.
     pub(super) connector_positions: HashMap<String, usize>,
-    /// The connectors of the component that refers to this system, and the file that contains them.
+    /// The connectors of the component that refers to this system, and the file that contains these connectors.
     pub(super) outside: Option<(Vec<Connector>, Rc<File>)>,
     pub(super) connections: Vec<Connection>,
     pub(super) bindings: Vec<Binding>,
@@ -66,7 +66,7 @@ pub(super) enum Content {
     System,
     /// An index into [`Tree::fmus`].
     Fmu(usize),
-    /// A signal dictionary; its connectors are its entries.
+    /// A signal dictionary, whose entries are its connectors.
     Dictionary,
     /// A reference to the signal dictionary at this index of [`Tree::nodes`].
     Reference(usize),
@@ -138,20 +138,20 @@ impl Tree {
         self.description(node).is_some_and(|description| description.version() != Version::V3)
     }
 
-    /// Returns whether a connector is a terminal of an FMU; a connection to it connects all members of the terminal.
+    /// Returns whether a connector is a terminal of an FMU, so that a connection to it connects all members.
     pub(super) fn is_terminal(&self, vertex: &Vertex) -> bool {
         let terminals =
             self.description(vertex.node).map(|description| description.terminals.iter());
         terminals.is_some_and(|mut all| all.any(|terminal| terminal.name == vertex.connector))
     }
 
-    /// Returns the connector as its file declares it; `None` if the file does not declare it.
+    /// Returns the declaration of a connector in its file; `None` if the file does not declare the connector.
     pub(super) fn connector(&self, node: usize, name: &str) -> Option<&Connector> {
         let node = &self.nodes[node];
         node.connector_positions.get(name).map(|&position| &node.connectors[position])
     }
 
-    /// Returns two measures of a connector: the one that the file states, and the one that the FMU states.
+    /// Returns two measures of a connector: the measure in the file, and the measure in the FMU.
     pub(super) fn measures(&self, vertex: &Vertex) -> (Measure, Measure) {
         let node = &self.nodes[vertex.node];
         let connector = self.connector(vertex.node, &vertex.connector);
@@ -162,14 +162,14 @@ impl Tree {
         (stated, declared.unwrap_or_default())
     }
 
-    /// Returns the unit or enumeration that the file states for a connector; what it omits is taken from the FMU.
+    /// Returns the unit or enumeration that the file states for a connector; missing parts are taken from the FMU.
     pub(super) fn measure(&self, vertex: &Vertex) -> Measure {
         let (stated, declared) = self.measures(vertex);
         stated.or(declared)
     }
 
     /// Returns the unit or enumeration that the component whose source is this system states for the connector; `None`
-    /// without such a component, or if it lacks the connector.
+    /// without such a component, or if the component lacks the connector.
     pub(super) fn measure_outside(&self, vertex: &Vertex) -> Option<Measure> {
         let (connectors, file) = self.nodes[vertex.node].outside.as_ref()?;
         let connector = connectors.iter().find(|connector| connector.name == vertex.connector)?;

@@ -29,11 +29,11 @@ pub(super) const TOOL: &str = "aso-ftc";
 
 /// Writes `assembly` as the SSP archive `target`; creates the folder of `target`.
 ///
-/// The FMUs go into `resources`, each with all its files. An archive is copied, also the one from which [`crate::open`]
-/// has unpacked an FMU; any other folder is packed. The settings of each element go into a parameter set `settings` in
-/// a separate file, bound to the component. Connectors are the connected variables and the outputs of type Real,
-/// Integer and Boolean, with the types and units of the FMUs; connectors of arrays have dimensions (SSP 2.0).
-/// `step_size` in s goes into the annotation that libcosim reads. Equal assemblies and FMUs give equal bytes.
+/// The FMUs go into `resources`, each with all its files. An archive is copied, including an archive from which
+/// [`crate::open`] has unpacked an FMU; any other folder is packed. The settings of each element go into a parameter
+/// set `settings` in a separate file, bound to the component. Connectors are the connected variables and the outputs of
+/// type Real, Integer and Boolean, with the types and units of the FMUs; connectors of arrays have dimensions (SSP
+/// 2.0). `step_size` in s goes into the annotation that libcosim reads. Equal assemblies and FMUs give equal bytes.
 ///
 /// # Errors
 ///
@@ -245,7 +245,7 @@ impl Exporter {
         })
     }
 
-    /// Returns name and definition of the unit of a variable, if it has one; an error if there is no such variable.
+    /// Returns name and definition of the unit of a variable, if it has a unit; an error for a missing variable.
     fn unit(&self, terminal: &Terminal) -> Result<Option<(String, Option<BaseUnit>)>, SspError> {
         let known = self.descriptions.get(&terminal.element);
         let description = known.ok_or_else(|| {

@@ -15,7 +15,7 @@ use super::error::SspError;
 
 /// Common start of all namespaces of SSP 1.0 and 2.0.
 const NAMESPACE: &str = "http://ssp-standard.org/SSP1/";
-/// The usual prefixes of these namespaces; they are accepted without a declaration.
+/// The usual prefixes of the SSP namespaces, which are accepted without a declaration.
 const PREFIXES: [&str; 5] = ["ssd", "ssc", "ssv", "ssm", "ssb"];
 /// Largest accepted file in bytes.
 const CAPACITY: usize = 64 << 20;
@@ -307,8 +307,8 @@ impl Node {
         }
     }
 
-    /// Reads each child `item` of the child `list` with `read`; empty if there is no such list.
-    /// Several lists of one name are joined; [`super::schema::check`] warns about them.
+    /// Reads each child `item` of the child `list` with `read`; empty without such a list. Several lists of one name
+    /// are joined; [`super::schema::check`] warns about these.
     pub(super) fn list<T>(
         &self,
         list: &str,

@@ -51,7 +51,7 @@ pub(crate) struct Files {
     pub(crate) fmus: Vec<Unpacked>,
     /// Names of the FMUs for messages.
     pub(crate) shown: Vec<PathBuf>,
-    /// Warnings about the files; each names its file.
+    /// Warnings about the files; each names the file.
     pub(crate) warnings: Vec<String>,
 }
 
@@ -107,7 +107,7 @@ impl Files {
         Ok(document)
     }
 
-    /// Returns the folder of an unpacked SSP; unpacks it on the first call and adds its warnings.
+    /// Returns the folder of an unpacked SSP; unpacks the SSP on the first call and adds the warnings of this SSP.
     fn unpacked(&mut self, target: &Target) -> Result<PathBuf, SspError> {
         if let Some(known) = self.archives.get(&target.path) {
             return Ok(known.clone());
@@ -175,7 +175,7 @@ impl Files {
         Ok(content)
     }
 
-    /// Reads and parses a file; adds its warnings.
+    /// Reads and parses a file; adds the warnings about the file.
     pub(crate) fn read<T>(
         &mut self,
         target: &Target,

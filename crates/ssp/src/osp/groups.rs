@@ -38,8 +38,8 @@ pub(super) fn find<'a>(groups: &'a [Group], name: &str) -> Option<&'a Group> {
 }
 
 impl Group {
-    /// Pairs the variables of two groups in order: the variables directly in the groups, then those of
-    /// nested groups. Returns an error sentence if the groups differ in shape.
+    /// Pairs the variables of two groups in order: the variables directly in the groups, then the variables of nested
+    /// groups. Returns an error sentence if the groups differ in shape.
     pub(super) fn pairs<'a>(&'a self, other: &'a Group) -> Result<Vec<[&'a str; 2]>, String> {
         let sizes = [
             (self.variables.len(), other.variables.len(), "variables"),

@@ -25,7 +25,7 @@ pub(super) enum Number {
     /// An item of an enumeration, with its number if the file defines it.
     Item(String, Option<i32>),
     Binary,
-    /// The description of an array; no variable can be set to it.
+    /// The description of an array value, which no variable can receive.
     Unsupported(String),
 }
 
@@ -34,7 +34,7 @@ impl Value {
         Value { number, measure }
     }
 
-    /// Returns the value of a parameter; the first of `scopes` with the name of its unit or enumeration defines it.
+    /// Returns the value of a parameter; its unit or enumeration is from the first of `scopes` that has this name.
     pub(super) fn of(parameter: &Parameter, scopes: &[&Definitions]) -> Self {
         let measure = match &parameter.value {
             ParameterValue::Real(_, Some(unit)) => Measure::unit(unit, scopes),
@@ -59,7 +59,7 @@ impl Value {
     }
 
     /// Converts the value to the unit of `there`, then applies the transformation of a mapping; also returns warnings.
-    /// Returns an error sentence if the units measure different quantities or the transformation is for another type.
+    /// Returns an error sentence if the units measure different quantities or the transformation has another type.
     pub(super) fn convert(
         self,
         conversion: &Conversion,

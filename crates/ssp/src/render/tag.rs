@@ -1,11 +1,11 @@
-//! A tree of elements. quick-xml writes it only when it is complete, because the root states the version of SSP that
-//! the content requires.
+//! A tree of elements. quick-xml writes the tree only when it is complete, because the root states the version of SSP
+//! that the content requires.
 
 use fmu_description::xml::writable;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
-/// The prefixes with their namespaces. The prefixes are the usual ones, because some importers compare them.
+/// The prefixes with their namespaces: the usual prefixes, because some importers compare prefixes.
 const PREFIXES: [(&str, &str); 6] = [
     ("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription"),
     ("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon"),
@@ -53,7 +53,7 @@ impl Tag {
         self
     }
 
-    /// If `is_newer`, marks the element as one that SSP 1.0 does not have.
+    /// If `is_newer`, marks the element as an element that SSP 1.0 does not have.
     pub(super) fn newer(mut self, is_newer: bool) -> Self {
         self.newer |= is_newer;
         self

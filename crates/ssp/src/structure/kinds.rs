@@ -33,7 +33,7 @@ words! {
         Output = "output",
         Parameter = "parameter",
         CalculatedParameter = "calculatedParameter",
-        /// For references to signal dictionaries only.
+        /// Input and output, in references to signal dictionaries only.
         Inout = "inout",
         /// SSP 2.0, of FMI 3.0.
         StructuralParameter = "structuralParameter",
@@ -89,7 +89,7 @@ pub enum Type {
     Binary,
     /// `Clock` (SSP 2.0), which FMI 2.0 does not have.
     Clock,
-    /// An array with these dimensions (SSP 2.0), of any element type.
+    /// An array with the given dimensions (SSP 2.0), of any element type.
     Array(Vec<Dimension>),
     /// A value of any type that belongs to the clock of this name (SSP 2.0).
     Clocked(String),

@@ -9,7 +9,7 @@ use fmu_description::package::{Unpacked, pack, write_archive};
 
 use crate::error::SspError;
 
-/// Maximum size of an archive without Zip64, with room for its directory.
+/// Maximum size of an archive without Zip64, which leaves room for the directory of the archive.
 const CAPACITY: usize = 1 << 31;
 
 /// The files below `resources`, by path in the archive.
