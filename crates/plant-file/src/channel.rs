@@ -40,7 +40,8 @@ pub(crate) struct ChannelSignals<'a> {
 }
 
 impl ChannelWeight {
-    /// The factor of a constant weight; 1 for a weight over frequency, whose states are added to the plant.
+    /// The factor of a constant weight; 1 for a weight over frequency, which is a system with states, added to the
+    /// plant.
     #[must_use]
     pub fn factor(&self) -> f64 {
         self.weight.as_constant().unwrap_or(1.0)
@@ -103,8 +104,8 @@ fn noises(entry: &Entry<'_>, names: &[&str], domain: Domain) -> Result<Vec<Chann
     Ok(names.iter().zip(all).map(named).collect())
 }
 
-/// Reads a weight: a number above 0, `{ low, frequency, high }` or `{ table }`, the last two with an optional `order`
-/// of 1 or 2.
+/// Reads a weight: a number above 0, `{ low, frequency, high }` or `{ table }`, each table with an optional `order` of
+/// 1 or 2.
 fn weight(entry: &Entry<'_>, signal: String, domain: Domain) -> Result<ChannelWeight> {
     if !entry.is_table() {
         let weight = Weight::constant(entry.positive()?);
@@ -154,7 +155,7 @@ fn read_points(entry: &Entry<'_>, domain: Domain) -> Result<Vec<(f64, f64)>> {
     Ok(points)
 }
 
-/// Reads a frequency in rad/s, below pi / T in a design with sample time T; returns the one that the bilinear map
+/// Reads a frequency in rad/s, below pi / T in a design with sample time T; returns the frequency that the bilinear map
 /// needs.
 fn continuous_frequency(entry: &Entry<'_>, domain: Domain) -> Result<f64> {
     let stated = entry.positive()?;

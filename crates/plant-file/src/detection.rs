@@ -11,13 +11,13 @@ use crate::signals::{Signal, name, position};
 /// The requirements on the detection of faults.
 #[derive(Clone, Debug)]
 pub struct DetectionRequest {
-    /// Its place in the file.
+    /// Place of the requirements in the file.
     pub place: Place,
     /// The test of the residuals.
     pub method: Method,
     /// Mean time between false alarms, s.
     pub false_alarm_interval: f64,
-    /// Whether each test should react to one fault only, as far as possible.
+    /// Whether each test should, as far as possible, react to a single fault only.
     pub isolation: bool,
     /// Noise of each measurement: the root of its spectral density, or its standard deviation in a
     /// sampled design.
@@ -26,7 +26,7 @@ pub struct DetectionRequest {
     pub process_noise: Option<ProcessNoise>,
     /// The size of each fault that should be detected.
     pub sizes: Vec<f64>,
-    /// Time between two tests of a continuous controller, s; `None` if it is not stated, and in a sampled design.
+    /// Time between two tests of a continuous controller, s; `None` if not stated, and in a sampled design.
     pub sample_time: Option<f64>,
     /// The model errors that must give no alarm, if the file states `model_error`.
     pub model_error: Option<ModelError>,
@@ -51,11 +51,11 @@ pub enum Method {
 /// The model errors that must give no alarm: deviations within the tolerances of `[robustness]`.
 #[derive(Clone, Debug)]
 pub struct ModelError {
-    /// Safety factor on the largest residual that these errors cause, at least 1.
+    /// Safety factor, at least 1, on the largest residual that model errors cause.
     pub margin: f64,
-    /// For each command the largest deviation from its operating point, if stated.
+    /// For each command, the largest deviation from the operating point, if stated.
     pub commands: Vec<Option<f64>>,
-    /// Its place in the file.
+    /// Place of `model_error` in the file.
     pub place: Place,
 }
 
@@ -66,31 +66,31 @@ pub struct ProcessNoise {
     pub values: Vec<f64>,
     /// Whether the file states a list, which has one number for each state.
     pub is_list: bool,
-    /// Its place in the file.
+    /// Place of `process_noise` in the file.
     pub place: Place,
 }
 
 /// An unknown input that is no fault.
 #[derive(Clone, Debug)]
 pub struct Disturbance {
-    /// Its name.
+    /// Name of the disturbance.
     pub name: String,
-    /// Where it enters the plant.
+    /// The point where the disturbance enters the plant.
     pub entry_point: DisturbanceEntry,
     /// Largest absolute value, if stated.
     pub bound: Option<f64>,
-    /// Its place in the file.
+    /// Place of the disturbance in the file.
     pub place: Place,
 }
 
-/// Where a disturbance enters the plant.
+/// The point where a disturbance enters the plant.
 #[derive(Clone, Debug)]
 pub enum DisturbanceEntry {
     /// The column E of x' = A x + E d.
     Column(DVector<f64>),
-    /// The command, by its position from 0, to which the disturbance is added.
+    /// Position, from 0, of the actuator to whose command the disturbance is added.
     Actuator(usize),
-    /// The measurement, by its position from 0, to which the disturbance is added.
+    /// Position, from 0, of the measurement to which the disturbance is added.
     Sensor(usize),
     /// An input of the plant's FMU.
     Input(String),
@@ -196,7 +196,7 @@ fn process_noise(entry: &Entry<'_>) -> Result<ProcessNoise> {
     }
 }
 
-/// Reads the size of each fault: its entry of `sizes`, otherwise its `step`, otherwise its `bound`.
+/// Reads the size of each fault: the entry of the fault in `sizes`, otherwise `step`, otherwise `bound` of the fault.
 fn sizes(entry: &Entry<'_>, faults: &[Fault]) -> Result<Vec<f64>> {
     let names: Vec<_> = faults.iter().map(|fault| fault.name.as_str()).collect();
     let stated = positives(&entry.table()?, "sizes", &names)?;

@@ -43,7 +43,7 @@ pub enum Law {
 pub struct EstimationRequest {
     /// The law.
     pub law: Law,
-    /// Its place in the file.
+    /// Place of the law in the file.
     pub place: Place,
 }
 

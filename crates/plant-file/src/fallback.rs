@@ -5,16 +5,16 @@ use crate::requirements::{Region, stated_region};
 use crate::signals::{Signal, positions};
 use files::{Place, Table};
 
-/// The failures that one feedback must serve without knowing which of them has occurred.
+/// The failures that one feedback must serve without knowledge of the failure that has occurred.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FallbackRequest {
     /// The actuators that may fail, from 0, one at a time.
     pub actuators: Vec<usize>,
-    /// The largest fraction of its effect that one of them may lose; 1 if it may be gone.
+    /// The largest fraction of its effect that the failed actuator may lose; 1 if it may be gone.
     pub loss: f64,
     /// The region of the eigenvalues in all cases; `None` if the file states none.
     pub region: Option<Region>,
-    /// Its place in the file.
+    /// Place of the request in the file.
     pub place: Place,
 }
 

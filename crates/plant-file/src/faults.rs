@@ -22,9 +22,9 @@ pub enum FaultDynamics {
 pub enum EntryPoint {
     /// Column of F_a, from 0.
     Column(usize),
-    /// An actuator, from 0: the fault is added to its command.
+    /// An actuator, from 0: the fault is added to the command of this actuator.
     Actuator(usize),
-    /// A measurement, from 0: the fault is added to it.
+    /// A measurement, from 0: the fault is added to this measurement.
     Sensor(usize),
     /// A loss of effectiveness: an actuator loses a fraction of its command. The fraction is estimated while the
     /// command is well above `least_command`.
@@ -41,15 +41,15 @@ pub enum EntryPoint {
 /// A fault.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
-    /// Its name.
+    /// Name of the fault.
     pub name: String,
-    /// Its unit in the notation of FMI: the stated one, otherwise that of its actuator or sensor.
+    /// Unit of the fault in the notation of FMI: stated, otherwise the unit of its actuator or sensor.
     pub unit: Option<String>,
     /// A description for readers.
     pub description: String,
-    /// Its assumed dynamics.
+    /// Assumed dynamics of the fault.
     pub dynamics: FaultDynamics,
-    /// Where it enters the plant.
+    /// The point where the fault enters the plant.
     pub entry_point: EntryPoint,
     /// Largest absolute value, if stated.
     pub bound: Option<f64>,
@@ -59,11 +59,11 @@ pub struct Fault {
     pub step: Option<f64>,
     /// The largest fraction of a loss of effectiveness for which the loop must be stable, if stated.
     pub up_to: Option<f64>,
-    /// Its place in the file.
+    /// Place of the fault in the file.
     pub place: Place,
 }
 
-/// The entries that state faults; an error about all faults is at the first of these that the file has.
+/// The entries that state faults. An error about all faults is at the first of these entries in the file.
 pub const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
 
 /// Largest number of faults with `up_to`.
@@ -84,8 +84,8 @@ const FAULT: [&str; 13] = [
     "step",
 ];
 
-/// Reads all faults: those of `actuator_faults` ("all" or names), then those of `[[faults]]` or, without that list, one
-/// fault for each column of `F_a`, named f1, f2 and so on. No fault at all is an error.
+/// Reads all faults: the faults of `actuator_faults` ("all" or names), then the faults of `[[faults]]` or, without that
+/// list, one fault for each column of `F_a`, named f1, f2 and so on. No fault at all is an error.
 ///
 /// `signals`: actuators and measurements.
 pub(crate) fn all_faults(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<Vec<Fault>> {
@@ -144,7 +144,7 @@ fn faults(entry: &Entry<'_>, signals: [&[Signal]; 2]) -> Result<Vec<Fault>> {
     Ok(all)
 }
 
-/// Reads a fault; without an entry point it enters by `column` of F_a, from 0.
+/// Reads a fault; without an entry point the fault enters by `column` of F_a, from 0.
 fn fault(entry: &Entry<'_>, signals: [&[Signal]; 2], column: usize) -> Result<Fault> {
     let [actuators, measurements] = signals;
     let table = entry.table()?;
@@ -215,7 +215,7 @@ fn entry_point(
     }
 }
 
-/// Reads `up_to`, the largest fraction of a loss of effectiveness; `None` if it is not stated.
+/// Reads `up_to`, the largest fraction of a loss of effectiveness; `None` if not stated.
 fn up_to(table: &Table<'_>) -> Result<Option<f64>> {
     let Some(entry) = table.get("up_to") else { return Ok(None) };
     if table.get("loss_of").is_none() {

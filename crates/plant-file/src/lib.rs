@@ -54,13 +54,13 @@ pub struct PlantFile<'a> {
     source: &'a Source,
     /// The places of the entries, for errors that are found later.
     places: BTreeMap<&'static str, Place>,
-    /// The description of the controller by the user; `None` if it is missing or empty.
+    /// The description of the controller by the user; `None` for a missing or empty one.
     pub description: Option<String>,
     /// Start time of the compensation, s.
     pub t_on: f64,
-    /// Whether the faults are also estimated while they are not compensated.
+    /// Whether the faults are also estimated before their compensation starts.
     pub monitor: bool,
-    /// The time constant, s, with which the commands change over to other gains; `None` if they jump.
+    /// The time constant, s, with which the commands change over to other gains; `None` if the commands jump.
     pub transfer_time: Option<f64>,
     /// The plant.
     pub model: Model,
@@ -92,7 +92,7 @@ pub struct PlantFile<'a> {
     pub step_size: Option<f64>,
     /// Limits of the verdict, and the tolerances.
     pub robustness: RobustnessLimits,
-    /// Plants that the same gains serve, besides the one of the file.
+    /// Further plants that the gains serve, besides the plant of the file.
     pub family: Vec<Variant>,
     /// The operating points between which gains are interpolated, if the file states a schedule.
     pub schedule: Option<Schedule>,
@@ -113,7 +113,7 @@ pub struct PlantFile<'a> {
 pub struct Sampling {
     /// Sample time, s.
     pub period: f64,
-    /// Whether the command uses the newest measurement (current estimator), or only earlier ones.
+    /// Whether the command uses the newest measurement (current estimator), or only earlier measurements.
     pub current: bool,
 }
 
@@ -289,7 +289,7 @@ impl<'a> PlantFile<'a> {
         self.source.text()
     }
 
-    /// Returns an error at the first of `keys` that the file has, otherwise at its first line.
+    /// Returns an error at the first of `keys` that the file has, otherwise at the first line of the file.
     pub fn error(&self, keys: &[&str], message: impl Into<String>) -> PlaceError {
         let place = keys.iter().find_map(|key| self.places.get(key)).cloned().unwrap_or(0..0);
         self.source.error(&place, message)
@@ -355,7 +355,7 @@ impl<'a> PlantFile<'a> {
     }
 
     /// Checks that F_a has one column for each fault that enters through it, is missing without such faults, and that a
-    /// fault is an input of an FMU only if the plant is one.
+    /// fault is an input of an FMU only if the plant is an FMU.
     fn check_columns(&self, file: &Table<'_>) -> Result<()> {
         let is_input = |fault: &&Fault| matches!(fault.entry_point, EntryPoint::Input(_));
         if let (None, Some(fault)) = (self.fmu(), self.faults.iter().find(is_input)) {

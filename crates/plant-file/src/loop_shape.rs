@@ -17,10 +17,10 @@ const PEAK: f64 = 1.5;
 const ROLL_OFF: f64 = 10.0;
 /// Default of `set_point`, relative to the bandwidth.
 const SET_POINT: f64 = 0.3;
-/// Bandwidths of feedback and observer from which the search starts, relative to that of the loop.
+/// Starts of the search: bandwidths of feedback and observer, relative to the bandwidth of the loop.
 const STARTS: [(f64, f64); 6] =
     [(1.0, 4.0), (0.5, 4.0), (1.0, 8.0), (2.0, 8.0), (0.5, 2.0), (1.0, 1.0)];
-/// Largest bandwidth of feedback and observer from which the search starts, in rad per sample.
+/// Largest bandwidth of feedback and observer at a start of the search, in rad per sample.
 const START_PER_SAMPLE: f64 = 1.5;
 /// Largest bandwidth of the loop in rad per sample.
 const PER_SAMPLE: f64 = 0.5;
@@ -37,11 +37,11 @@ pub struct LoopShape {
     pub peak: f64,
     /// |T| is below `peak` x `roll_off` / w at frequencies w above `roll_off`, both in rad/s.
     pub roll_off: f64,
-    /// |K S| is below `effort` at every frequency, if it is stated.
+    /// |K S| is below `effort` at every frequency; `None` without this requirement.
     pub effort: Option<f64>,
-    /// PI, PID or other controllers of low order in place of the state feedback, if they are stated.
+    /// PI, PID or other controllers of low order in place of the state feedback, if stated.
     pub pid: Option<Pid>,
-    /// Its place in the file.
+    /// Place of the shape in the file.
     pub place: Place,
 }
 

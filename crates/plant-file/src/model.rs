@@ -22,14 +22,14 @@ pub enum Model {
         b: DMatrix<f64>,
         /// C, p x n.
         c: DMatrix<f64>,
-        /// D, p x m; zero if it is not stated.
+        /// D, p x m; zero if not stated.
         d: DMatrix<f64>,
-        /// F_a, n x q, with a column for each fault that enters through F_a; `None` if it is not stated.
+        /// F_a, n x q, with a column for each fault that enters through F_a; `None` if not stated.
         f_a: Option<DMatrix<f64>>,
         /// The states.
         states: Vec<Signal>,
-        /// The sampled matrices, if the file states `matrices = "sampled"`: then `a`, `b` and `f_a` are those of the
-        /// continuous plant with these samples or, if there is none, those of the file.
+        /// The sampled matrices, if the file states `matrices = "sampled"`: then `a`, `b` and `f_a` belong to the
+        /// continuous plant with these samples or, if none exists, are the stated ones.
         sampled: Option<Box<SampledMatrices>>,
     },
     /// The matrices are linearised from an FMU.
@@ -37,7 +37,7 @@ pub enum Model {
 }
 
 impl Model {
-    /// Why the plant is known in its samples only; `None` if it is known in continuous time.
+    /// Why the plant is known in its samples only; `None` for a plant that is known in continuous time.
     #[must_use]
     pub fn only_samples(&self) -> Option<&str> {
         match self {
@@ -98,7 +98,7 @@ fn texts(entry: &Entry<'_>) -> Result<Vec<String>> {
     entry.list()?.iter().map(|member| member.text().map(str::to_owned)).collect()
 }
 
-/// Reads a plant whose matrices the file states; returns actuators and measurements, too.
+/// Reads a plant whose matrices the file states; also returns actuators and measurements.
 pub(crate) fn read_matrices(
     file: &Table<'_>,
     sampling: Option<Sampling>,
@@ -136,7 +136,7 @@ pub(crate) fn read_matrices(
     Ok((model, [actuators, measurements]))
 }
 
-/// Reads the `count` signals under `key`; without that entry their names are `letter` and a number from 1.
+/// Reads the `count` signals under `key`; without this entry the names are `letter` and a number from 1.
 fn read_signals(
     file: &Table<'_>,
     key: &str,

@@ -1,4 +1,4 @@
-//! Checks the names in a plant file against those of the controller FMU.
+//! Checks the names in a plant file against the names in the controller FMU.
 
 use crate::read::Result;
 use files::PlaceError;
@@ -79,7 +79,7 @@ pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<()> {
     check_fault_names(file)
 }
 
-/// The scheduling variable, if it is an input of its own.
+/// The scheduling variable, if it is a separate input of the controller FMU.
 fn schedule_input<'a>(file: &'a PlantFile<'_>) -> Option<&'a Signal> {
     match &file.schedule.as_ref()?.variable {
         Variable::Input(signal) => Some(signal),
@@ -197,8 +197,7 @@ impl ControllerVariables {
         Self(all)
     }
 
-    /// Whether `name` is one of these variables, an element of one of these arrays, or, in continuous time, a
-    /// derivative.
+    /// Whether `name` is one of the scalars, an element of one of the arrays, or, in continuous time, a derivative.
     fn include(&self, name: &str) -> bool {
         let derivative = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
         if let Some(state) = derivative {
@@ -209,7 +208,7 @@ impl ControllerVariables {
         self.has(name, |_| true)
     }
 
-    /// Whether `name` is one of the variables for which `examined` is true, or an element of one.
+    /// Whether `name` is one of the variables for which `examined` is true, or an element of such a variable.
     fn has(&self, name: &str, examined: impl Fn(&str) -> bool) -> bool {
         let array = array_element(name).map(|(array, _)| array);
         self.0.iter().filter(|(variable, _)| examined(variable)).any(

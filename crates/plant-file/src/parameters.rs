@@ -5,23 +5,23 @@ use std::ops::Range;
 use crate::read::{Result, within};
 use files::Entry;
 
-/// A parameter of the plant's FMU, and how far it may be from its value.
+/// A parameter of the plant's FMU, and its tolerance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterTolerance {
     /// The name of the parameter of the FMU.
     pub name: String,
-    /// How far it varies.
+    /// Tolerance of the parameter.
     pub tolerance: Tolerance,
-    /// Its place in the plant file.
+    /// Place of the parameter in the plant file.
     pub place: Range<usize>,
 }
 
-/// How far a parameter may be from its value.
+/// Largest deviation of a parameter from its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
     /// Fraction of the value.
     Relative(f64),
-    /// Lowest and highest value; the linearisation of the FMU checks that the value is between them.
+    /// Lowest and highest value; the linearisation of the FMU checks that the value is between these.
     Limits([f64; 2]),
 }
 

@@ -34,7 +34,7 @@ pub struct Pid {
     pub pairs: Vec<Pair>,
     /// The corner frequency w of the filters, in rad/s.
     pub corner: f64,
-    /// Their place in the file.
+    /// Place of the controllers in the file.
     pub place: Place,
 }
 

@@ -20,8 +20,8 @@ pub(crate) fn optional<'a, T>(
     table.get(key).as_ref().map(read).transpose()
 }
 
-/// Reads a table with a number above 0 for some of `names`. Returns for each name the number, `None` if there is none,
-/// or its error, so that callers report mistakes in the order of the names.
+/// Reads a table with a number above 0 for some of `names`. Returns for each name the number, `None` without a number,
+/// or the error, so that callers report mistakes in the order of the names.
 pub(crate) fn positives(
     table: &Table<'_>,
     key: &str,
@@ -65,7 +65,7 @@ pub(crate) fn whole(entry: &Entry<'_>, range: RangeInclusive<u32>) -> Result<u32
     Err(entry.error(format!("expected a whole number from {least} to {most}, found {number}")))
 }
 
-/// Reads one of two texts; returns whether it is the first one.
+/// Reads one of two texts; returns whether the text is the first one.
 pub(crate) fn is_first(entry: &Entry<'_>, [first, second]: [&str; 2]) -> Result<bool> {
     match entry.text()? {
         text if text == first || text == second => Ok(text == first),

@@ -12,14 +12,14 @@ pub struct ReconfigurationRequest {
     pub actuators: Vec<usize>,
     /// The largest number of actuators that are gone together.
     pub together: usize,
-    /// For each of these actuators the command at which it is stuck, in its unit.
+    /// For each of `actuators`, the command at which it is stuck, in the unit of the command.
     stuck_at: Vec<f64>,
-    /// The measurements to keep at the operating point, from 0; all of them if the file states none.
+    /// The measurements to keep at the operating point, from 0; all measurements if the file states none.
     pub keep: Vec<usize>,
-    /// Loss and time in s: an actuator counts as gone after its estimated loss has been above this loss for this time;
-    /// `None` if only an input of the FMU reports it.
+    /// Threshold of the estimated loss, and the time in s above it after which an actuator counts as gone; `None` if
+    /// only an input of the FMU reports an actuator as gone.
     pub decision: Option<(f64, f64)>,
-    /// Its place in the file.
+    /// Place of the requirements in the file.
     pub place: Place,
 }
 
@@ -57,7 +57,7 @@ impl ReconfigurationRequest {
         }))
     }
 
-    /// The command at which an actuator is stuck; 0 if it is none of those that may be gone.
+    /// The command at which an actuator is stuck; 0 for an actuator that cannot be gone.
     #[must_use]
     pub fn stuck_at(&self, actuator: usize) -> f64 {
         let position = self.actuators.iter().position(|used| *used == actuator);
@@ -89,8 +89,8 @@ impl ReconfigurationRequest {
     }
 }
 
-/// Reads `together`, how many actuators may be gone together; 1 if it is missing. `used` of `all` actuators may be
-/// gone. An error if that makes more than [`MOST_SETS`] sets.
+/// Reads `together`, how many actuators may be gone together; 1 without this entry. `used` of `all` actuators may be
+/// gone. An error for more than [`MOST_SETS`] sets of them.
 fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize> {
     let Some(entry) = table.get("together") else { return Ok(1) };
     let most = used.min(all - 1);
@@ -117,7 +117,7 @@ fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize> {
     Ok(most_together)
 }
 
-/// Reads `stuck_at`, a table from actuators to commands; 0 for actuators that it does not name.
+/// Reads `stuck_at`, a table from actuators to commands; 0 for actuators that the table does not name.
 fn stuck(table: &Table<'_>, actuators: &[Signal], used: &[usize]) -> Result<Vec<f64>> {
     let mut commands = vec![0.0; used.len()];
     let Some(entry) = table.get("stuck_at") else { return Ok(commands) };

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use crate::signals::{Signal, description, name, position, position_of, unit};
 
-/// The error of a sum of factors, such as three times 0.3333, up to which it is 1.
+/// Largest error of a sum of factors, such as three times 0.3333, with which the sum counts as 1.
 const ROUNDING: f64 = 1e-3;
 
 /// The references of a plant file.
@@ -17,15 +17,15 @@ pub struct References {
     pub signals: Vec<Signal>,
     /// H, t x p: each reference is the set point of an entry of H y, with the measurements y.
     pub h: DMatrix<f64>,
-    /// For each reference the size of the step that the report shows, in its unit, if stated.
+    /// For each reference, the size of the step in the report, in the unit of the reference, if stated.
     pub steps: Vec<Option<f64>>,
-    /// Where each reference is stated.
+    /// Place of each reference in the file.
     pub places: Vec<Place>,
     /// Whether the control errors are integrated; otherwise the references act by the feedforward only.
     pub integral: bool,
     /// Whether the references act on the commands by a constant gain.
     pub feedforward: bool,
-    /// Where `integral` and `feedforward` are stated; the place of the table if they are not.
+    /// Places of `integral` and `feedforward` in the file; the place of the table for an entry that is not stated.
     pub action_places: [Place; 2],
     /// Time constant, in s, of the back-calculation of the integrals while a command is at its limit, if stated.
     pub windup_time: Option<f64>,
@@ -82,9 +82,9 @@ impl References {
         Ok(Some(references))
     }
 
-    /// Returns the references with operating points and units. The operating points follow from those of the
-    /// measurements, `None` if none has one. A unit that is not stated is that of the measurements, if they have the
-    /// same one. A combination of temperatures in degC has it only if its factors add up to 1: a difference has none.
+    /// Returns the references with operating points and units. The operating points follow from the measurements,
+    /// `None` if no measurement has one. A unit that is not stated is the common unit of the measurements, if any. A
+    /// combination of temperatures in degC has this unit only if its factors add up to 1.
     #[must_use]
     pub fn completed(&self, measurements: &[Signal]) -> Vec<Signal> {
         let complete = |(at, signal): (usize, &Signal)| {
@@ -111,8 +111,8 @@ impl References {
     }
 }
 
-/// Reads a reference: the name of a measurement, or a table. Returns the signal, its row of H and the size of its
-/// step, if stated.
+/// Reads a reference: the name of a measurement, or a table. Returns the signal of the reference, the row of H and the
+/// size of the step, if stated.
 fn reference(
     entry: &Entry<'_>,
     measurements: &[Signal],

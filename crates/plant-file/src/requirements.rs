@@ -13,16 +13,16 @@ use files::{Entry, Place, Table};
 /// A requirement on a gain.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Requirement {
-    /// These eigenvalues of the continuous loop in 1/s; for a sampled loop they become e^(p T).
+    /// Eigenvalues p of the continuous loop in 1/s; for a sampled loop the eigenvalues are e^(p T).
     Eigenvalues(Vec<Complex<f64>>),
-    /// These eigenvalues of the sampled loop.
+    /// Eigenvalues of the sampled loop.
     SampledEigenvalues(Vec<Complex<f64>>),
     /// Eigenvalues in a region.
     Region(Region),
     /// The least integral of x'Q x + u'R u (LQR), or the least variance for noise of intensity W
     /// and V (Kalman).
     Weights {
-        /// Q of a regulator, the weight of the states; W of a filter, the intensity of their noise.
+        /// Q of a regulator, the weight of the states; W of a filter, the intensity of the noise of the states.
         states: DMatrix<f64>,
         /// R of a regulator, the weight of the commands; V of a filter, the intensity of the noise of the measurements.
         channels: DMatrix<f64>,
@@ -43,9 +43,9 @@ pub enum Requirement {
 /// The bandwidth of a loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bandwidth {
-    /// In rad/s; `None` until it is chosen.
+    /// The bandwidth in rad/s; `None` until it is chosen.
     pub rate: Option<f64>,
-    /// Whether the file states it.
+    /// Whether the file states the bandwidth.
     pub is_stated: bool,
 }
 
@@ -63,16 +63,16 @@ pub struct Region {
 /// A requirement and its place in the file.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// What is required.
+    /// The requirement on the loop.
     pub requirement: Requirement,
-    /// Its place in the file.
+    /// Place of the requirement in the file.
     pub place: Place,
     /// Name and place of the second weight, R or V; none for other requirements.
     pub other: Option<(String, Place)>,
 }
 
 impl Request {
-    /// A request for a bandwidth that is yet to be chosen, as the file states no requirement; `place`: of the file.
+    /// A request for a bandwidth that is yet to be chosen, as the file states no requirement; errors point at `place`.
     #[must_use]
     pub fn open(place: Place) -> Self {
         let requirement = Requirement::Bandwidth(Bandwidth { rate: None, is_stated: false });
@@ -105,8 +105,8 @@ impl Requirement {
         }
     }
 
-    /// The index of the first state whose row of the first weight is zero, which has no noise in a Kalman filter.
-    /// `None` if there is no such state, and for requirements without weights.
+    /// Returns the index of the first state whose row of the first weight is zero, so that a Kalman filter has no noise
+    /// on it. `None` if there is no such state, and for requirements without weights.
     #[must_use]
     pub fn without_noise(&self) -> Option<usize> {
         match self {
@@ -120,8 +120,8 @@ impl Requirement {
 
 const KEYS: [&str; 5] = ["bandwidth", "eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
 
-/// Reads `[feedback]` (`weights` Q, R) or `[observer]` (`weights` W, V): exactly one requirement; a region is one by
-/// itself, or restricts `h_infinity`.
+/// Reads `[feedback]` (`weights` Q, R) or `[observer]` (`weights` W, V): exactly one requirement; a region is a
+/// requirement alone, or restricts `h_infinity`.
 pub(crate) fn request(
     table: &Table<'_>,
     weights: [&str; 2],
@@ -284,7 +284,8 @@ fn disc(entry: &Entry<'_>) -> Result<(f64, f64)> {
     }
 }
 
-/// Reads a bound of the norm, or the text "least" (`None`). `remedy`: what the file lacks for "least", if anything.
+/// Reads a bound of the norm, or the text "least" (`None`). `remedy`: the entry, if any, that the file needs for
+/// "least".
 fn bound(entry: &Entry<'_>, remedy: Option<&str>) -> Result<Option<f64>> {
     if !entry.is_text() {
         return entry.positive().map(Some);
@@ -298,7 +299,7 @@ fn bound(entry: &Entry<'_>, remedy: Option<&str>) -> Result<Option<f64>> {
     }
 }
 
-/// Asymmetry of a weight, relative to its largest entry, that counts as rounding, as in a product of three matrices.
+/// Largest asymmetry of a weight, relative to its largest entry, that counts as rounding of a matrix product.
 const UNSYMMETRIC: f64 = 1e-12;
 
 /// Reads a symmetric matrix, or a list of numbers of at least 0 as a diagonal matrix. A matrix that rounding made

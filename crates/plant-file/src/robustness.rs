@@ -12,7 +12,7 @@ use crate::read::{Result, each, not_negative, optional, whole, within};
 pub struct RobustnessLimits {
     /// Relative tolerances of the entries of A, B, C and D.
     pub tolerance: [f64; 4],
-    /// Tolerances of single entries, in place of those of their matrices.
+    /// Tolerances of single entries, in place of the tolerances of their matrices.
     pub entries: Vec<EntryTolerance>,
     /// Tolerances of parameters of the plant's FMU; if there are any, the entries are exact.
     pub parameters: Vec<ParameterTolerance>,
@@ -20,14 +20,14 @@ pub struct RobustnessLimits {
     pub cases: u32,
     /// Seed of the random cases.
     pub seed: u32,
-    /// Noise of each measurement: the root of its spectral density, or its standard deviation in a sampled design; 1
-    /// if it is not stated.
+    /// Noise of each measurement: the root of its spectral density, or its standard deviation in a sampled design; 1 if
+    /// not stated.
     pub noise: Vec<f64>,
     /// Whether the file states the noise.
     pub noise_is_stated: bool,
     /// Peak of S above which a design is amber.
     pub amber: f64,
-    /// Peak of S above which it is red.
+    /// Peak of S above which a design is red.
     pub red: f64,
 }
 
@@ -36,7 +36,7 @@ pub struct RobustnessLimits {
 pub struct EntryTolerance {
     /// The entries that vary.
     pub entries: Vec<PlantEntry>,
-    /// Fraction of their values; 0 for exact entries.
+    /// Tolerance as a fraction of the values of the entries; 0 for exact entries.
     pub relative: f64,
 }
 
@@ -159,7 +159,7 @@ fn plant_entry(text: &str) -> Option<PlantEntry> {
     Some(PlantEntry { matrix, row: index(row)?, column: index(column)? })
 }
 
-/// Reads one number for A, B, C and D, or a table with a number for some of them; 0 for the others.
+/// Reads one number for A, B, C and D, or a table with a number for some matrices; 0 for the remaining ones.
 fn tolerances(entry: &Entry<'_>) -> Result<[f64; 4]> {
     if !entry.is_table() {
         return Ok([fraction(entry)?; 4]);

@@ -9,15 +9,15 @@ use nalgebra::DMatrix;
 use crate::Sampling;
 use crate::read::{Result, is_first, refuse};
 
-/// Below this fraction of the geometric mean of the largest entries in its row and column, an entry of the matrix
-/// logarithm counts as rounding.
+/// Size of an entry of the matrix logarithm that counts as rounding, relative to the geometric mean of the largest
+/// entries in its row and column.
 const ROUNDING: f64 = 1e-13;
 
-/// Modulus below which an eigenvalue of a sampled A counts as zero: rounding makes those of a chain of three registers
-/// 1e-5.
+/// Modulus below which an eigenvalue of a sampled A counts as zero: rounding moves the zero eigenvalues of a chain of
+/// three registers to 1e-5.
 const ZERO: f64 = 1e-4;
 
-/// The plant of sampled matrices: the continuous plant x' = A x + B u with these samples if there is one, otherwise the
+/// The plant of sampled matrices: the continuous plant x' = A x + B u with these samples, if one exists, otherwise the
 /// plant in sampled time.
 #[derive(Clone)]
 pub struct SampledMatrices {
@@ -27,7 +27,7 @@ pub struct SampledMatrices {
     pub b: DMatrix<f64>,
     /// The time domain of A and B.
     pub domain: Domain,
-    /// Why no continuous plant has these samples, in a sentence; `None` if there is one.
+    /// Why no continuous plant has these samples, in a sentence; `None` if such a plant exists.
     pub only_samples: Option<String>,
     /// The integral of e^(A s) over a sample, n x n; the identity if `a` is in sampled time.
     hold_integral: DMatrix<f64>,
@@ -86,7 +86,7 @@ impl SampledMatrices {
     }
 }
 
-/// Says why no continuous plant has the samples. Zero eigenvalues mostly come from a delay: says how to state it, too.
+/// Says why no continuous plant has the samples. For zero eigenvalues, mostly of a delay, also how to state it.
 fn only_samples(a: &DMatrix<f64>, period: f64) -> String {
     let eigenvalues = eigenvalues(a).unwrap_or_default();
     let zeros = eigenvalues.iter().filter(|value| value.norm() < ZERO).count();

@@ -9,9 +9,9 @@ use files::{Entry, Place, Table};
 /// A state, an actuator, a measurement, a reference or a scheduling variable.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Signal {
-    /// Its name.
+    /// Name of the signal.
     pub name: String,
-    /// Its unit in the notation of FMI.
+    /// Unit of the signal in the notation of FMI.
     pub unit: Option<String>,
     /// The meaning of the signal, for a reader.
     pub description: String,
@@ -19,7 +19,7 @@ pub struct Signal {
     pub operating: Option<f64>,
     /// The smallest and the largest value: the limits of an actuator or the range of a measurement, if stated.
     pub limits: Option<[f64; 2]>,
-    /// The longest time in s for which its last valid value may replace a measurement, if stated.
+    /// The longest time in s for which the last valid value of a measurement may replace it, if stated.
     pub longest_hold: Option<f64>,
     /// The time in s after which a command acts or a measurement arrives; 0 if not stated.
     pub delay: f64,
@@ -34,7 +34,7 @@ impl Signal {
         Self { name, ..Self::default() }
     }
 
-    /// The signal with unit and operating point of `other` if its own are missing.
+    /// The signal with unit and operating point of `other` where the signal has none.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self {
@@ -45,7 +45,7 @@ impl Signal {
     }
 }
 
-/// Number of states of the observer for each delay, if it is not stated.
+/// Default number of states of the observer for each delay.
 const DELAY_ORDER: usize = 3;
 /// The largest number of states of the observer for each delay.
 const MOST_DELAY_ORDER: u32 = 8;
@@ -140,7 +140,7 @@ pub(crate) fn unit(table: &Table<'_>) -> Result<Option<String>> {
     }
 }
 
-/// Relative difference of two units, and distance of their zeros, below which they are the same.
+/// Relative difference of the factors of two units, and distance of their zeros, below which the units are the same.
 const SAME_UNIT: f64 = 1e-6;
 
 /// Whether two units are the same, or FMI does not know one of them.

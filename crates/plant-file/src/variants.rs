@@ -9,7 +9,7 @@ use crate::references::References;
 use crate::signals::{Signal, description, name, unit};
 use crate::{Model, PlantFile};
 
-/// Matrices that replace those of the plant of the file.
+/// Matrices of a variant, which replace the matrices of the plant of the file.
 const MATRICES: [&str; 4] = ["A", "B", "C", "F_a"];
 /// The operating point of a plant that matrices describe.
 const OPERATING: [&str; 3] = ["x_op", "u_op", "y_op"];
@@ -19,9 +19,9 @@ const POINT: &str = "operating_point";
 /// A plant besides the one of the file.
 #[derive(Clone)]
 pub struct Variant {
-    /// Its name.
+    /// Name of the plant.
     pub name: String,
-    /// Its place in the file.
+    /// Place of the plant in the file.
     pub place: Place,
     model: Model,
     /// `u_op` and `y_op`, if stated.
@@ -31,7 +31,7 @@ pub struct Variant {
 /// The schedule of a controller: the variable that selects the gains, and the plant at each grid point.
 #[derive(Clone)]
 pub struct Schedule {
-    /// What the gains depend on.
+    /// The scheduling variable, on which the gains depend.
     pub variable: Variable,
     /// Largest rate of the variable, per s, if stated.
     pub rate_bound: Option<f64>,
@@ -78,8 +78,8 @@ impl PlantFile<'_> {
     }
 
     /// The file with the plant of `variant`, without family and schedule. Operating values of actuators and
-    /// measurements that the variant does not state are those of the file; for an FMU they follow from its
-    /// linearisation.
+    /// measurements that the variant does not state are the values of the file; for an FMU the linearisation gives
+    /// these values.
     #[must_use]
     pub fn with(&self, variant: &Variant) -> Self {
         let mut file = self.clone();
@@ -163,7 +163,7 @@ pub(crate) fn schedule(
     Ok(Some(Schedule { variable, rate_bound: positive(&table, "rate_bound")?, points, nominal }))
 }
 
-/// Reads the points of a schedule; returns the position of the one with the plant of the file, too.
+/// Reads the points of a schedule; also returns the position of the point with the plant of the file.
 fn points(list: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usize)> {
     let mut all: Vec<SchedulePoint> = Vec::new();
     let mut nominal = None;
@@ -255,7 +255,7 @@ fn numbers(table: &Table<'_>, key: &str, count: usize) -> Result<Option<Vec<f64>
     Err(entry.error(format!("expected {count} numbers, found {}", values.len())))
 }
 
-/// Refuses references without integral action in a file with a family: its members would not reach them.
+/// Refuses references without integral action in a file with a family, whose members would not reach the set points.
 pub(crate) fn check_action(file: &PlantFile<'_>) -> Result<()> {
     let references = file
         .references

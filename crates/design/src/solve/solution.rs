@@ -63,7 +63,7 @@ pub(crate) struct Solution {
     /// Largest real part of the closed-loop eigenvalues, or largest modulus minus one; negative if
     /// stable.
     pub(crate) instability: f64,
-    /// Whether the faults are estimated while they are not compensated.
+    /// Whether the faults are also estimated before their compensation starts.
     pub(crate) monitor: bool,
     /// The instability of the observer error before `t_on`; None if the faults are estimated from the start.
     pub(crate) instability_before: Option<f64>,
