@@ -24,7 +24,7 @@ pub struct AssembledSystem {
     pub steps: Vec<(String, f64)>,
     /// Whether the system structure requests libcosim's fixed-step algorithm.
     pub fixed_step: bool,
-    /// The system structure with the folders of its unpacked FMUs; keep it as long as the system.
+    /// The system structure, whose folders contain the unpacked FMUs; keep it as long as the system.
     pub opened: Option<Arc<Opened>>,
     /// FMUs by name that the master integrates by model exchange, with the method.
     pub integrated: Vec<(String, Solver)>,
@@ -99,7 +99,7 @@ pub fn assemble_with(
 }
 
 /// Applies the settings of structural parameters or, if `structural` is false, of all other variables: first the
-/// settings of the system structure, then the settings of the configuration, which override them.
+/// settings of the system structure, then the settings of the configuration, which override the former.
 fn apply_settings(
     system: &mut System,
     loaded: &LoadedConfig,
@@ -151,9 +151,9 @@ fn element(name: &str, path: &Path) -> Element {
     Element { name: name.to_owned(), fmu: path.to_owned(), ..Element::default() }
 }
 
-/// Makes the connections. A connection of the configuration takes precedence over one of `links` to
-/// the same input. If the configuration states neither connections nor a system structure, connects variables
-/// of equal names and, with `by_unit`, of equal units.
+/// Makes the connections. A connection of the configuration takes precedence over a connection in `links` to the same
+/// input. If the configuration states neither connections nor a system structure, connects variables of equal names
+/// and, with `by_unit`, of equal units.
 fn connect(
     system: &mut System,
     loaded: &LoadedConfig,

@@ -17,13 +17,13 @@ use format::Format;
 /// Part of the `mimeType` of the operations of a CAN bus.
 const CAN: &str = "fmi-ls-bus.can";
 
-/// The variables by which a terminal of a CAN bus sends.
+/// The variables through which a terminal of a CAN bus sends frames.
 #[derive(Clone, Copy, Debug)]
 struct Sender {
     slave: usize,
     clock: u32,
     data: u32,
-    /// Number of its bus.
+    /// Number of the bus of the terminal.
     bus: usize,
 }
 
@@ -34,14 +34,14 @@ struct Writer {
     path: PathBuf,
     /// `None` until the FMUs are initialised.
     file: Option<File>,
-    /// Bytes for the file. Once the file exists, they are written at once, so that a killed run loses no frame.
+    /// Bytes to write to the file: at once if the file exists, so that a killed run loses no frame.
     bytes: Vec<u8>,
     format: Format,
-    /// The present time in s, and the frames of this instant with their bus: several terminals of a bus may send
-    /// the same frame, which is written once.
+    /// The present time in s, and the frames of this instant with their bus. A frame that several terminals of a bus
+    /// send at the same instant is written once.
     time: f64,
     frames: Vec<(usize, Operation)>,
-    /// The first error of a write; no frame is written after it.
+    /// The first error of a write, after which no frame is written.
     failed: Option<std::io::Error>,
 }
 
@@ -142,7 +142,7 @@ impl Writer {
     }
 }
 
-/// A terminal of a CAN bus, with the names of its variables `Tx_Data` and `Rx_Data`, by which it is connected.
+/// A terminal of a CAN bus, with the names of its variables `Tx_Data` and `Rx_Data`, which are connected.
 struct Node {
     sender: Sender,
     output: String,
@@ -210,7 +210,7 @@ fn nodes(system: &System) -> Vec<Node> {
 }
 
 /// Returns pairs of terminals on the same bus, as positions in `nodes`: terminals that are connected, and terminals of
-/// the same FMU if it simulates a bus.
+/// the same FMU if the FMU simulates a bus.
 fn links(system: &System, nodes: &[Node]) -> Vec<(usize, usize)> {
     let mut links = Vec::new();
     for connection in &system.connections {

@@ -1,4 +1,4 @@
-//! The configuration `system.toml`. Options of the command line take precedence over it.
+//! The configuration `system.toml`. Options of the command line take precedence over this file.
 
 mod every;
 mod interface;
@@ -35,7 +35,7 @@ pub struct Config {
     /// A system structure on which the configuration builds: an SSP, an SSD, an `OspSystemStructure.xml`, or a folder
     /// with an SSD or an `OspSystemStructure.xml`.
     pub system: Option<PathBuf>,
-    /// Shared libraries that are loaded before the FMUs, which see their symbols.
+    /// Shared libraries to load before the FMUs, which can then use the symbols of these libraries.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub preload: Vec<String>,
     /// Whether the libraries of FMUs that have source code only are built.
@@ -45,14 +45,13 @@ pub struct Config {
     #[serde(skip_serializing_if = "is_default")]
     pub fmus: Ordered<PathBuf>,
     /// The interfaces of FMUs, by name; default: the interface that the system structure states, otherwise
-    /// co-simulation if the FMU offers it.
+    /// co-simulation if offered.
     #[serde(skip_serializing_if = "is_default")]
     pub interface: Ordered<Interface>,
     /// The integration methods of FMUs that run by model exchange, by name; default: automatic.
     #[serde(skip_serializing_if = "is_default")]
     pub solver: Ordered<Solver>,
-    /// Connections. If neither they nor `system` are stated, variables of equal names are
-    /// connected.
+    /// Connections. Without `connections` and `system`, variables of equal names are connected.
     pub connections: Option<Vec<Spanned<ConnectionEntry>>>,
     /// Values of variables, set before the initialization.
     #[serde(skip_serializing_if = "is_default")]
@@ -106,7 +105,7 @@ impl LoadedConfig {
     }
 
     /// Adds the location `place` in the file to `error`. Returns `error` unchanged if the configuration comes from no
-    /// file or if `place` is empty, as it is for values of the command line.
+    /// file or if `place` is empty, which is the case for values of the command line.
     #[must_use]
     pub fn point(&self, place: &Place, error: impl Into<Error>) -> Error {
         let error = error.into();

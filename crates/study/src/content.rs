@@ -6,7 +6,7 @@ use fmu_import::{Fmu, isolate};
 /// An opened FMU.
 #[derive(Clone)]
 pub(crate) enum Content {
-    /// Its library is loaded into this process.
+    /// The library of the FMU is loaded into this process.
     Loaded(Fmu),
     /// Each instance runs in a separate process.
     Isolated(isolate::Package),
@@ -20,8 +20,8 @@ impl Content {
         }
     }
 
-    /// Returns whether several runs of this process can use the FMU: it can be instantiated several times per process,
-    /// or its instances run in separate processes.
+    /// Returns whether several runs of this process can use the FMU: the FMU can be instantiated several times per
+    /// process, or the instances run in separate processes.
     pub(crate) fn is_reusable(&self) -> bool {
         let description = self.description();
         let (simulation, exchange) = (description.stepped(), description.model_exchange.as_ref());

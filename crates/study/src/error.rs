@@ -40,7 +40,7 @@ pub enum Error {
     /// Results cannot be written.
     #[error(transparent)]
     Results(#[from] ResultsError),
-    /// Two files that the run would write are the same, or one of them is a file that it reads.
+    /// Two files that the run would write are the same, or one of them is a file that the run reads.
     #[error(transparent)]
     Outputs(#[from] files::OutputConflict),
     /// A file cannot be read or written.
@@ -59,7 +59,7 @@ pub enum Error {
     /// A name or pattern of variables to record matches none.
     #[error(transparent)]
     Selection(#[from] SelectionError),
-    /// An error with its context, such as an FMU or an entry. Its message is the context only.
+    /// An error with its context, such as an FMU or an entry. The message is the context only.
     #[error("{what}")]
     Within {
         /// The context, such as the name of an FMU.
@@ -79,8 +79,7 @@ impl Error {
         Error::Within { what: what.into(), source: Box::new(self) }
     }
 
-    /// Joins the error and its causes to one sentence. Leaves out a cause that the error above it
-    /// already quotes.
+    /// Joins the error and its causes to one sentence. Leaves out a cause that the preceding error already quotes.
     #[must_use]
     pub fn sentence(&self) -> String {
         files::sentence(self)

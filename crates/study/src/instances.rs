@@ -110,8 +110,8 @@ fn stated_interface(element: &Element, config: &Config) -> Option<Interface> {
     })
 }
 
-/// Returns the interface to use: the stated one if the FMU offers it, otherwise co-simulation if the FMU offers it,
-/// otherwise model exchange. Returns an error if the FMU does not offer the interface that the configuration states.
+/// Returns the interface to use: the stated one, otherwise co-simulation if the FMU offers it, otherwise model
+/// exchange. Returns an error if the FMU does not offer the interface that the configuration states.
 fn choose_interface(
     element: &Element,
     description: &ModelDescription,
@@ -168,7 +168,7 @@ impl<'a> FmuOpener<'a> {
         Ok(content)
     }
 
-    /// Creates an instance in a separate process: for model exchange, integrated there, if there is a `method`,
+    /// Creates an instance in a separate process: with a `method` for model exchange, integrated in that process,
     /// otherwise for co-simulation. Returns an error for model exchange with a log of calls.
     fn isolated(
         &self,
@@ -233,7 +233,7 @@ impl<'a> FmuOpener<'a> {
     }
 }
 
-/// Returns the path of the FMU of an element. Builds its library first if the FMU has source code only.
+/// Returns the path of the FMU of an element. If the FMU has source code only, builds the library first.
 fn compiled(element: &Element) -> Result<PathBuf, Error> {
     let compiled = fmu_import::compile(&element.fmu);
     compiled.map_err(|error| as_shown(Error::from(error).within(&element.name), element))

@@ -11,11 +11,11 @@ pub struct LogFields {
     pub message: String,
     /// The instance name of the FMU; empty for messages that come from no FMU.
     pub instance: String,
-    /// The category that the FMU states; empty if it states none.
+    /// The category that the FMU states; empty if the FMU states none.
     pub category: String,
     /// Simulated time in s, if stated.
     pub time: Option<f64>,
-    /// Number of lost messages that the message reports, if it does; its text contains the number, too.
+    /// Number of lost messages, for a message that reports a loss; `message` contains the number, too.
     pub lost: Option<u64>,
     /// All further fields, each as `, name = value`.
     pub others: String,

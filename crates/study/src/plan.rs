@@ -18,7 +18,7 @@ const ROWS: f64 = 1e4;
 const LENGTH: f64 = 1.0;
 /// A step of fewer spacings between neighbouring floating-point times gives a warning.
 const STEP_RESOLUTION: f64 = 50.0;
-/// Relative difference up to which a proposed step counts as a multiple of the communication step, and the length of a
+/// Relative tolerance with which a proposed step counts as a multiple of the communication step, and the length of a
 /// run as [`ROWS`] steps.
 const NEAR: f64 = 1e-6;
 
@@ -101,7 +101,7 @@ fn check_step(request: &AlgorithmRequest) -> Result<(), Error> {
     }
 }
 
-/// Warns if `step` is so small that rounding at the time `latest`, both in s, changes it by a percent or more.
+/// Warns if `step` is so small that rounding at the time `latest`, both in s, changes the step by a percent or more.
 fn warn_of_resolution(step: f64, latest: f64) {
     let resolution = latest.next_up() - latest;
     if step < STEP_RESOLUTION * resolution {
@@ -114,8 +114,8 @@ fn warn_of_resolution(step: f64, latest: f64) {
     }
 }
 
-/// If the system structure requests libcosim's fixed-step algorithm, fills in its method, extrapolation and coupling
-/// where nothing else is stated.
+/// If the system structure requests libcosim's fixed-step algorithm, fills in method, extrapolation and coupling of
+/// that algorithm where the user states nothing else.
 fn propose_algorithm(
     request: &mut AlgorithmRequest,
     assembled: &AssembledSystem,
@@ -136,9 +136,10 @@ fn propose_algorithm(
     }
 }
 
-/// Fills in the steps that the system structure proposes. If no communication step is stated, it is the base step,
-/// otherwise the smallest step proposed for an FMU. FMUs step every several communication steps if the request states
-/// neither such multiples nor step control, iteration, rollback or events, and if no algebraic loop is to be iterated.
+/// Fills in the steps that the system structure proposes. Without a stated communication step, this step becomes the
+/// base step or, without one, the smallest step proposed for an FMU. FMUs step every several communication steps if the
+/// request states neither such multiples nor step control, iteration, rollback or events, and if no algebraic loop is
+/// to be iterated.
 fn propose_steps(
     request: &mut AlgorithmRequest,
     assembled: &AssembledSystem,
@@ -180,9 +181,9 @@ fn propose_steps(
     }
 }
 
-/// Returns start and stop time in s: stated by the user, otherwise by the system structure, otherwise the
-/// earliest start and the latest stop after it of all FMUs. Without any of them, a run starts at 0 s and has
-/// the length [`LENGTH`].
+/// Returns start and stop time in s: stated by the user, otherwise by the system structure, otherwise the earliest
+/// start time of all FMUs, and their latest stop time after this start. Without any of them, a run starts at 0 s and
+/// has the length [`LENGTH`].
 fn times(config: &Config, assembled: &AssembledSystem, reasons: &mut Vec<String>) -> (f64, f64) {
     let stated = |time: &Option<Spanned<f64>>| time.as_ref().map(|time| *time.get_ref());
     let defaults = || {

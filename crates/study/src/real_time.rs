@@ -7,8 +7,7 @@ use fmu_description::number::seconds;
 
 /// Longest sleep before the next check whether the wait ends early.
 const SLICE: Duration = Duration::from_millis(50);
-/// Remaining wait in which the clock is read in a loop, because a sleep may end late by about this
-/// time.
+/// Remaining wait below which the clock is read in a loop, because a sleep may end late by about this time.
 const SPIN: Duration = Duration::from_micros(150);
 
 /// A factor of real time: `factor` seconds of simulated time take one second of wall-clock time.
@@ -31,25 +30,25 @@ impl std::str::FromStr for RealTimeFactor {
 /// Delays a run so that the communication point `t` is not passed before the instant
 /// `i(t) = i_0 + (t - t_0) / factor` of a monotonic clock.
 ///
-/// `t_0` and `i_0` are simulated time and instant at the start. Each instant is computed from them,
-/// so that errors of single waits do not add up. A step that ends after its instant is an overrun;
-/// later steps are not delayed until the run has caught up.
+/// `t_0` and `i_0` are simulated time and instant at the start. Each instant is computed from `t_0` and `i_0`, so that
+/// errors of single waits do not add up. A step that ends after its instant is an overrun; later steps are not delayed
+/// until the run has caught up.
 #[derive(Clone, Debug)]
 pub struct RealTime {
     start: Option<(f64, Instant)>,
     overruns: Overruns,
 }
 
-/// The overruns of a paced run. The text of its [`fmt::Display`] is a clause of the run's summary.
+/// The overruns of a paced run. [`fmt::Display`] writes a clause for the run's summary.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Overruns {
     /// The factor of real time.
     pub factor: f64,
     /// Number of steps so far.
     pub steps: u64,
-    /// Number of steps that ended after their instant.
+    /// Number of overruns: steps that ended after their instant.
     pub count: u64,
-    /// Largest time in s by which a step ended after its instant.
+    /// Largest overrun in s.
     pub largest: f64,
     /// Simulated time in s at the end of that step; 0 without overruns.
     pub at: f64,
@@ -77,9 +76,8 @@ impl RealTime {
         Self { start: None, overruns: Overruns { factor, ..Overruns::default() } }
     }
 
-    /// Waits until the instant of the simulated time `time` in s, or counts an overrun if it has
-    /// passed. The first call starts the clock. Returns early if `ends` returns true, which is called
-    /// at least every 50 ms.
+    /// Waits until the instant of the simulated time `time` in s, or counts an overrun if this instant has passed. The
+    /// first call starts the clock. Returns early if `ends` returns true, which is called at least every 50 ms.
     pub fn wait(&mut self, time: f64, mut ends: impl FnMut() -> bool) {
         let now = Instant::now();
         let Some((first, start)) = self.start else {

@@ -43,11 +43,11 @@ impl Files {
 #[derive(Default)]
 struct Recording {
     path: PathBuf,
-    /// `None` after the file was completed or its recorder dropped, or after [`keep_results`].
+    /// The sink; `None` after the file was completed or its recorder dropped, or after [`keep_results`].
     sink: Option<Box<dyn Sink>>,
     /// Whether a row was recorded since the last check of [`write_stalled`].
     recent: bool,
-    /// Whether a row was recorded between the two checks before, so that it may not be in the file yet.
+    /// Whether a row was recorded between the last two checks of [`write_stalled`] and may not be in the file yet.
     pending: bool,
     /// The error of a write by [`write_stalled`], which the next call returns.
     failed: Option<ResultsError>,
@@ -125,7 +125,7 @@ impl Recorder {
         Ok(Some(Self { recording, due, readout, slow }))
     }
 
-    /// Records a row if one is due at the time of `simulation`. Call it once for each communication point, in order.
+    /// Records a row if the time of `simulation` is due for one. Call it once for each communication point, in order.
     #[inline]
     pub(crate) fn sample(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
         let time = simulation.time();
@@ -187,7 +187,7 @@ fn write_stalled() {
     }
 }
 
-/// Returns `ports` without the variables that their FMUs refuse to read, and logs a warning for each of those.
+/// Returns `ports` without the variables that their FMUs refuse to read, and logs a warning for each variable left out.
 fn readable(system: &mut System, ports: &[Port], time: f64) -> Result<Vec<Port>, Error> {
     let refused = Readout::new(system, ports).unreadable(system, ports, time)?;
     for (port, error) in &refused {
@@ -255,7 +255,7 @@ fn has_long_item(kind: &Kind, description: &ModelDescription) -> bool {
     declared.is_some_and(|one| one.items.iter().any(|(_, value)| i32::try_from(*value).is_err()))
 }
 
-/// Returns the unit of a variable, if it has one.
+/// Returns the unit of a variable, if the variable has one.
 #[must_use]
 pub fn unit(system: &System, port: Port) -> Option<String> {
     system.variable(port).kind.as_real().and_then(|real| real.unit.clone())

@@ -52,7 +52,7 @@ impl PreparedRun {
     ///
     /// # Errors
     ///
-    /// Returns the first error found, with its line if it is in a file.
+    /// Returns the first error found, with its line for an error in a file.
     pub fn new(loaded: LoadedConfig, options: &AssemblyOptions<'_>) -> Result<Self, Error> {
         Self::with_slaves(loaded, options, Vec::new())
     }
@@ -223,7 +223,7 @@ fn scenario(
     Ok(prepared.scenario)
 }
 
-/// If checkpoints are requested, checks before the run that they have a file, and that all FMUs can save their state.
+/// If checkpoints are requested, checks before the run that their file is stated and all FMUs can save their state.
 fn check_saving(config: &Config, system: &System) -> Result<(), Error> {
     let Some(path) = &config.checkpoint.file else { return Ok(()) };
     if path.is_dir() {
@@ -251,7 +251,7 @@ fn check_saving(config: &Config, system: &System) -> Result<(), Error> {
 pub enum RunEnd {
     /// The run reached its stop time.
     AtStop,
-    /// This FMU requested the end.
+    /// The FMU with this name requested the end.
     ByFmu(String),
     /// The caller requested the end.
     Interrupted,
@@ -264,7 +264,7 @@ pub enum RunEnd {
 pub struct RunStatistics {
     /// Number of communication steps.
     pub steps: u64,
-    /// Wall-clock time of [`Run::advance`] in s; 0 until it has returned.
+    /// Wall-clock time of [`Run::advance`] in s; 0 until that call has returned.
     pub seconds: f64,
 }
 
@@ -295,8 +295,8 @@ pub struct Run {
     pub plan: Plan,
     recorder: Option<Recorder>,
     checkpoints: Option<Checkpoints>,
-    /// Whether the run was resumed with the same interval between rows, so that the first run has already handled the
-    /// communication point at which this one starts.
+    /// Whether the run was resumed with the same interval between rows, so that the original run has already handled
+    /// the communication point at which this run starts.
     resumed: bool,
     tally: RunStatistics,
     trace: Option<BusTrace>,
@@ -394,7 +394,7 @@ impl Run {
         SavedRun { text, checkpoint, due, slow }.write(&checkpoints.path)
     }
 
-    /// Returns the number of steps so far, and the wall-clock time of [`Run::advance`] after it has returned.
+    /// Returns the number of steps so far, and the wall-clock time of [`Run::advance`], 0 until that call has returned.
     #[must_use]
     pub fn tally(&self) -> RunStatistics {
         self.tally

@@ -81,7 +81,7 @@ impl SavedRun {
         Ok(config::parse(&self.text, path)?)
     }
 
-    /// Returns the schedule of the next rows if rows were recorded at the interval `every`, otherwise `None`.
+    /// Returns the schedule of the next rows if the saved run recorded rows at the interval `every`, otherwise `None`.
     #[must_use]
     pub fn due(&self, every: Every) -> Option<&Due> {
         let (text, due) = self.due.as_ref()?;

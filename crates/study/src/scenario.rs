@@ -47,7 +47,7 @@ pub struct Scenario {
 pub struct SetEntry {
     /// `slave.variable`: an input without a connection, or a tunable parameter.
     pub variable: Spanned<String>,
-    /// Time in s; the value takes effect at the first communication point at or after it.
+    /// Time in s; the value takes effect at the first communication point at or after this time.
     pub at: f64,
     /// The value that the variable gets.
     pub value: Spanned<Literal>,

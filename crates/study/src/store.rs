@@ -44,7 +44,7 @@ impl Stamp {
     }
 }
 
-/// Identifies an FMU in the store, for instances in this process or in separate ones.
+/// Identifies an FMU in the store, for instances in this process or in separate processes.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct FmuKey {
     stamp: Stamp,
@@ -111,7 +111,7 @@ impl Store {
         lock(&self.fmus).len()
     }
 
-    /// Returns whether there is no FMU in the store; it may still have system structures.
+    /// Returns whether there is no FMU in the store; the store may still have system structures.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -124,7 +124,7 @@ impl fmt::Debug for Store {
     }
 }
 
-/// Locks `mutex`, even if another thread has panicked while it held the lock.
+/// Locks `mutex`, even if another thread has panicked during its lock of it.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -23,12 +23,12 @@ pub struct Table {
     pub names: Vec<String>,
     /// The first column: time in s, ascending.
     pub times: Arc<[f64]>,
-    /// The other columns, with the length of `times`.
+    /// The columns after the time, each with the length of `times`.
     pub columns: Vec<Arc<[f64]>>,
 }
 
 impl Table {
-    /// Returns the column called `name`, if there is one; the first column, `time`, is not among them.
+    /// Returns the column called `name`, if there is one; `time`, the first column, is not among these columns.
     #[must_use]
     pub fn column(&self, name: &str) -> Option<&Arc<[f64]>> {
         let position = self.names.iter().position(|known| known == name)?;

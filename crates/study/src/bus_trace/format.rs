@@ -210,7 +210,7 @@ fn packet(
     block(file, 6, &content)
 }
 
-/// Writes a block of PCAPNG: its type, its length before and after the content.
+/// Writes a block of PCAPNG: the type, the length, the content, and the length again.
 fn block(file: &mut impl Write, kind: u32, content: &[u8]) -> io::Result<()> {
     let length = u32::try_from(content.len() + 12).map_err(io::Error::other)?.to_le_bytes();
     file.write_all(&kind.to_le_bytes())?;

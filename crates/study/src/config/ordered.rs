@@ -26,7 +26,7 @@ impl<T> Ordered<T> {
         self.0.iter().find(|(known, _)| known == name).map(|(_, value)| value)
     }
 
-    /// Sets the value of `name`: replaces it in its place, or adds it at the end.
+    /// Sets the value of `name`: replaces an existing value in its place, or adds the value at the end.
     pub fn put(&mut self, name: String, value: T) {
         match self.0.iter_mut().find(|(known, _)| *known == name) {
             Some((_, old)) => *old = value,
@@ -96,7 +96,7 @@ impl fmt::Display for SettingValue {
 pub struct Settings(pub Vec<(String, SettingValue, Place)>);
 
 impl Settings {
-    /// Adds a setting of the command line after all others, and removes an earlier one of the same name.
+    /// Adds a setting of the command line after all others, and removes an earlier setting of the same name.
     pub fn push(&mut self, name: String, value: String) {
         self.0.retain(|(known, _, _)| *known != name);
         self.0.push((name, SettingValue::Text(value), 0..0));

@@ -23,25 +23,25 @@ pub struct Intervention {
     pub time: f64,
     /// The earliest time in s at which the change can take effect: the default time of an entry.
     pub from: f64,
-    /// The entries with all times, as in a `system.toml` below `scenario`.
+    /// The entries with all times, in the form of `scenario` in a `system.toml`.
     pub text: String,
 }
 
 impl Run {
-    /// Adds entries to the scenario. `text` has `[[set]]` and `[[fault]]` as a `system.toml` has them
-    /// below `scenario`. Call it between steps, from [`Run::advance_open`].
+    /// Adds entries to the scenario. `text` has `[[set]]` and `[[fault]]` as `scenario` in a `system.toml`. Call it
+    /// between steps, from [`Run::advance_open`].
     ///
-    /// The default of a time `at` or `from` is [`master::Simulation::next_change`]. A delay starts at the present
-    /// time plus the delay if that is later, because the run has no earlier values of the connection.
+    /// The default of a time `at` or `from` is [`master::Simulation::next_change`]. A delay starts at the present time
+    /// plus the delay if this sum is later, because the run has no earlier values of the connection.
     ///
     /// [`Run::config`] has the entries afterwards: a run of this configuration from the start gives
     /// the same results, bit for bit.
     ///
     /// # Errors
     ///
-    /// Returns an error, and changes nothing, if the run ends before a change can take effect, if `text` has no
-    /// entry or one that a `system.toml` does not allow, if a time is before its default, or if a delay is
-    /// added to a run whose steps vary: which values such a run keeps depends on its steps so far.
+    /// Returns an error, and changes nothing, if the run ends before a change can take effect, if `text` has no entry
+    /// or an entry that a `system.toml` does not allow, if a time is before its default, or if a delay is added to a
+    /// run whose steps vary: which values such a run keeps depends on its steps so far.
     pub fn intervene(&mut self, text: &str) -> Result<Intervention, Error> {
         let time = self.simulation.time();
         let from = self.simulation.next_change().ok_or_else(|| {

@@ -155,7 +155,7 @@ fault! {
     Quantisation {
         /// Distance of two levels.
         step: f64,
-        /// One of the levels.
+        /// A level; further levels are whole multiples of `step` away.
         #[serde(default)]
         offset: f64,
     }

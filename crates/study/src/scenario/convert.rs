@@ -26,9 +26,9 @@ impl Conversion {
         self.factor * difference
     }
 
-    /// Returns the conversion from the unit `stated` to the unit of `variable`, called `name`; the
-    /// identity if no unit is stated. It has no offset if the variable is a difference (`relativeQuantity`). Returns an
-    /// error if the variable has no unit, or if the units are unknown or measure different quantities.
+    /// Returns the conversion from the unit `stated` to the unit of `variable`, called `name`; the identity if no unit
+    /// is stated. The conversion has no offset if the variable is a difference (`relativeQuantity`). Returns an error
+    /// if the variable has no unit, or if the units are unknown or measure different quantities.
     pub(super) fn find(
         stated: Option<&str>,
         name: &str,
@@ -55,8 +55,8 @@ impl Conversion {
     }
 }
 
-/// Returns the base of a unit: from the definition in the FMU, otherwise from the name. Returns an error if the
-/// FMU does not define the unit and the name is not one.
+/// Returns the base of a unit: from the definition in the FMU, otherwise from the name. Returns an error if the FMU
+/// does not define the unit and `name` is no unit of FMI.
 fn base_of(name: &str, description: &ModelDescription) -> Result<BaseUnit, Reason> {
     let defined = description.units.iter().find(|unit| unit.name == name);
     if let Some(base) = defined.and_then(|unit| unit.base) {

@@ -80,7 +80,7 @@ pub enum Reason {
     Kinds {
         /// The kinds that the entry states.
         actual: Vec<&'static str>,
-        /// The kinds of which an entry states one.
+        /// The kinds from which an entry must state exactly one.
         expected: &'static str,
     },
     /// The kind does not fit the type of the variable.

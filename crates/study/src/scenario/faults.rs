@@ -55,8 +55,8 @@ impl<'a> Resolver<'a> {
         Ok(chains)
     }
 
-    /// Returns the input that `stated` names as `slave.variable` or as `slave.output=slave.input`. Returns an
-    /// error if it has neither a connection nor a signal, or if its source is not the one stated.
+    /// Returns the input that `stated` names as `slave.variable` or as `slave.output=slave.input`. Returns an error if
+    /// the input has neither a connection nor a signal, or if its source is not the stated output.
     fn faulty_input(&self, stated: &str) -> Result<Target<'a>, Reason> {
         let (source, input) = match stated.split_once('=') {
             Some((source, input)) => (Some(source.trim()), input.trim()),
@@ -91,7 +91,7 @@ struct EntryConverter<'a> {
     target: Target<'a>,
     /// Start of the simulation in s.
     start: f64,
-    /// Position among the faults of the input, so that two of them have different random series.
+    /// Position among the faults of the input, which gives each of these faults a different random series.
     index: u64,
 }
 
@@ -157,7 +157,7 @@ impl EntryConverter<'_> {
     }
 
     /// Returns `number`; an error if the input is not of a floating-point type and `number` is not whole or may be
-    /// rounded. It may be beyond the range of the input, to which the faulty value is limited.
+    /// rounded. `number` may be beyond the range of the input, because the faulty value is limited to this range.
     fn whole(&self, what: &'static str, number: f64) -> Result<f64, Reason> {
         let is_real = self.target.is_real();
         let is_exact = is_real || number.abs() < 2_f64.powi(53);
@@ -166,7 +166,7 @@ impl EntryConverter<'_> {
         require(what, number, fits, "a whole number, as the input is an Integer")
     }
 
-    /// Converts a value, if one is stated, to the type and unit of the input; returns an error if it does not fit.
+    /// Converts a value, if stated, to the type and unit of the input; returns an error for a value that does not fit.
     fn value(&self, value: Option<&Literal>, unit: Conversion) -> Result<Option<f64>, Reason> {
         let Some(value) = value else { return Ok(None) };
         let number = value.number(self.target.variable, self.target.description);

@@ -20,7 +20,7 @@ const KINDS: &str = "constant, steps, points, ramp, sine, csv";
 /// Largest number of names in a message.
 const MOST_NAMES: usize = 10;
 
-/// The settings of one variable: times with values, and the first entry with its path.
+/// The settings of one variable: times with values, and the first of the entries with the path of this entry.
 struct Settings<'a> {
     target: Target<'a>,
     path: String,
@@ -193,8 +193,8 @@ fn encode(
     Ok(conversion.absolute(number))
 }
 
-/// Returns the signal that holds each setting until the next one; of several at the same time, the last one stated
-/// applies.
+/// Returns the signal that holds each setting until the next one; of several settings at the same time, the last one
+/// stated applies.
 fn source_of_settings(
     mut points: Vec<(f64, f64)>,
     texts: Vec<String>,
@@ -284,7 +284,7 @@ fn column_signal(
     Ok(Signal::Track(Track::new(table.times.clone(), values.clone(), interpolation)?))
 }
 
-/// Returns the signal in the unit of the variable; without a conversion it still shares the values of its table.
+/// Returns the signal in the unit of the variable. Without a conversion, signal and table still share the values.
 fn scaled(signal: Signal, conversion: Conversion) -> Signal {
     if conversion == Conversion::NONE {
         return signal;
