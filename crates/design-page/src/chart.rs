@@ -12,14 +12,14 @@ const BOTTOM: f64 = 48.0;
 /// Outer width of a figure in units of its SVG.
 const WIDTH: f64 = 440.0;
 const HEIGHT: f64 = 370.0;
-/// The ends of the horizontal axis.
+/// Positions of the ends of the horizontal axis.
 pub(super) const HORIZONTAL: (f64, f64) = (LEFT, WIDTH - RIGHT);
-/// The ends of the vertical axis, from bottom to top.
+/// Positions of the ends of the vertical axis, from bottom to top.
 pub(super) const VERTICAL: (f64, f64) = (HEIGHT - BOTTOM, TOP);
 
 /// A pair of axes.
 pub(super) struct Chart<'a> {
-    /// Identifier on the page.
+    /// Identifier of the figure on the page.
     pub(super) id: &'a str,
     pub(super) title: &'a str,
     /// A description of the figure for screen readers.

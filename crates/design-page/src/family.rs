@@ -10,7 +10,7 @@ use design_report::family::{FamilyReport, MemberReport};
 use design_report::robustness::{LoopPoint, Number, ToleranceResult};
 use design_report::schedule::ScheduleReport;
 
-/// The meaning of P.
+/// Title of the matrix P.
 const LYAPUNOV: &str = "Lyapunov matrix";
 
 pub(super) fn family(report: &Report, family: &FamilyReport) -> Markup {

@@ -151,9 +151,9 @@ fn count<S: Serializer>(places: &&[f64], serializer: S) -> Result<S::Ok, S::Erro
 /// The JSON of all plots.
 #[derive(Serialize)]
 struct Data<'a> {
-    /// The lengths of the grids: time, frequency.
+    /// The lengths of the grids of times and of frequencies.
     grids: [usize; 2],
-    /// The bits of a value of a curve: 64 or 32.
+    /// Number of bits of each value of a curve: 64 or 32.
     bits: u8,
     plots: &'a [Plot<'a>],
     block: String,

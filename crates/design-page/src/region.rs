@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::plane::Plane;
 use design_report::Region;
 
-/// Number of points along a part of the boundary.
+/// Number of points that draw a part of the boundary.
 const STEPS: u16 = 400;
 
 /// Returns points of `plane` along the boundary of each part of the region (decay, disc, each side of the sector),

@@ -12,7 +12,7 @@ use design_report::robustness::{
 };
 use design_report::{Matrix, Report};
 
-/// Largest number of entries in the table of the sensitivities.
+/// Largest number of plant entries in the table of the sensitivities.
 const SHOWN: usize = 12;
 
 /// Shows the peaks of S and the stability with exact delays; empty for a plant without delays.

@@ -21,7 +21,7 @@ use plant_file::signals::joined;
 /// Largest modulus of an eigenvalue of A times the integration step: Runge-Kutta's method of order 4 has then an error
 /// of some 1e-6 a step.
 const RESOLUTION: f64 = 0.2;
-/// Most integration steps of a sample that are chosen.
+/// Largest number of integration steps of the filter in one sample.
 const MOST_STEPS: f64 = 1e4;
 
 /// Returns the Kalman filter for the plant of `file`, for the noise of the designed observer; `stop_time`: of its

@@ -62,7 +62,7 @@ pub struct ModelError {
 /// The process noise of the states.
 #[derive(Clone, Debug)]
 pub struct ProcessNoise {
-    /// One number for all states, or one for each.
+    /// One number for all states, or one number for each state.
     pub values: Vec<f64>,
     /// Whether the file states a list, which has one number for each state.
     pub is_list: bool,
@@ -77,7 +77,7 @@ pub struct Disturbance {
     pub name: String,
     /// The point where the disturbance enters the plant.
     pub entry_point: DisturbanceEntry,
-    /// Largest absolute value, if stated.
+    /// Largest absolute value of the disturbance, if stated.
     pub bound: Option<f64>,
     /// Place of the disturbance in the file.
     pub place: Place,

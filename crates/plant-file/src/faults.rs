@@ -45,17 +45,17 @@ pub struct Fault {
     pub name: String,
     /// Unit of the fault in the notation of FMI: stated, otherwise the unit of its actuator or sensor.
     pub unit: Option<String>,
-    /// A description for readers.
+    /// A description of the fault for readers.
     pub description: String,
     /// Assumed dynamics of the fault.
     pub dynamics: FaultDynamics,
     /// The point where the fault enters the plant.
     pub entry_point: EntryPoint,
-    /// Largest absolute value, if stated.
+    /// Largest absolute value of the fault, if stated.
     pub bound: Option<f64>,
-    /// Largest absolute rate, per s, if stated.
+    /// Largest absolute rate of the fault, per s, if stated.
     pub rate_bound: Option<f64>,
-    /// Largest step change, if stated.
+    /// Largest step change of the fault, if stated.
     pub step: Option<f64>,
     /// The largest fraction of a loss of effectiveness for which the loop must be stable, if stated.
     pub up_to: Option<f64>,

@@ -70,7 +70,7 @@ pub struct PlantFile<'a> {
     pub measurements: Vec<Signal>,
     /// The faults that are estimated.
     pub faults: Vec<Fault>,
-    /// Set points of measurements, if there are any.
+    /// Set points of measurements, if the file states any.
     pub references: Option<References>,
     /// The sampling of the controller; `None` in continuous time.
     pub sampling: Option<Sampling>,
@@ -100,7 +100,7 @@ pub struct PlantFile<'a> {
     pub is_point: bool,
     /// Unknown inputs that are no faults.
     pub disturbances: Vec<Disturbance>,
-    /// The requirements on the detection of faults, if there are any.
+    /// The requirements on the detection of faults, if the file states any.
     pub detection: Option<DetectionRequest>,
     /// The requirements on the controllers for actuators that are gone, if there are any.
     pub reconfiguration: Option<ReconfigurationRequest>,

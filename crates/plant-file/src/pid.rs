@@ -30,7 +30,7 @@ pub const MOST_ORDER: u32 = 6;
 pub struct Pid {
     /// n, the number of states of each filter; derivatives up to order n - 1 are used.
     pub order: usize,
-    /// The controllers, in the order of their commands; a command has at most one.
+    /// The controllers, in the order of their commands; each command has at most one controller.
     pub pairs: Vec<Pair>,
     /// The corner frequency w of the filters, in rad/s.
     pub corner: f64,

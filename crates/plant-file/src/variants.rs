@@ -24,7 +24,7 @@ pub struct Variant {
     /// Place of the plant in the file.
     pub place: Place,
     model: Model,
-    /// `u_op` and `y_op`, if stated.
+    /// `u_op` and `y_op`, the operating values of commands and measurements, if stated.
     operating: [Option<Vec<f64>>; 2],
 }
 
@@ -33,7 +33,7 @@ pub struct Variant {
 pub struct Schedule {
     /// The scheduling variable, on which the gains depend.
     pub variable: Variable,
-    /// Largest rate of the variable, per s, if stated.
+    /// Largest rate of the scheduling variable, per s, if stated.
     pub rate_bound: Option<f64>,
     /// The points of the grid, at least two, in ascending order.
     pub points: Vec<SchedulePoint>,
@@ -53,7 +53,7 @@ pub enum Variable {
 /// A plant at a value of the scheduling variable.
 #[derive(Clone)]
 pub struct SchedulePoint {
-    /// The value of the variable.
+    /// The value of the scheduling variable.
     pub at: f64,
     /// The plant at this value.
     pub plant: Variant,

@@ -13,7 +13,7 @@ use crate::report::{Bound, Frequency, Norm};
 use crate::solve::solution::Solution;
 use plant_file::faults::Fault;
 
-/// Relative width of the bracket of a peak gain or a norm.
+/// Relative width of the bracket at which the computation of a peak gain or a norm ends.
 const WIDTH: f64 = 1e-3;
 /// Number of equal parts of a sample time. A fault is constant over each part; the states are read at its start.
 const PARTS: u32 = 16;

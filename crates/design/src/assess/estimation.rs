@@ -14,7 +14,7 @@ use crate::report::{Estimation, EstimationErrors};
 use crate::solve::solution::Solution;
 use plant_file::robustness::RobustnessLimits;
 
-/// Relative width of the brackets of the peak gains.
+/// Relative width of the bracket at which the computation of a peak gain ends.
 const WIDTH: f64 = 1e-3;
 /// Relative band of the settling time.
 const SETTLED: f64 = 0.02;

@@ -70,7 +70,7 @@ pub(crate) fn report(
 struct Examination<'a> {
     cases: Cases<'a>,
     gains: Gains,
-    /// H2 norms of the intact loop, one for each measurement.
+    /// H2 norms of the intact loop, one for each measurement, to which the norms of the cases are compared.
     reference: Vec<f64>,
 }
 

@@ -20,7 +20,7 @@ use plant_file::faults::EntryPoint;
 
 /// Largest number of states of plant and controller for which linear matrix inequalities are solved.
 const LARGEST_ORDER: usize = 30;
-/// Rates of the reachable sets, relative to twice the proven decay rate.
+/// Rates of the reachable sets to try, relative to twice the proven decay rate.
 const RATES: [f64; 3] = [0.2, 0.5, 0.8];
 
 /// An actuator that may lose effectiveness up to a stated fraction.
@@ -28,7 +28,7 @@ struct StatedLoss {
     name: String,
     actuator: usize,
     up_to: f64,
-    /// The command at the operating point.
+    /// The command of the actuator at the operating point.
     operating: f64,
 }
 

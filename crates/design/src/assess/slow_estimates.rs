@@ -11,7 +11,7 @@ use plant_file::signals::joined;
 
 /// Decay rate of an estimate, relative to the slowest mode of the feedback, below which the estimate is too slow.
 const SLOW: f64 = 0.05;
-/// A mode has settled within 2 % after this many time constants.
+/// Number of time constants after which a mode has settled within 2 %.
 const SETTLED: f64 = 4.0;
 
 /// Returns a warning if the slowest mode of the observer is much slower than the slowest mode of the feedback: a

@@ -26,7 +26,7 @@ pub(super) struct Identification {
     pub(super) sample_time: Option<f64>,
     /// Relative tolerance of the entries.
     pub(super) tolerance: Option<f64>,
-    /// How the plant was identified, in lines.
+    /// The method and the quality of the identification, in lines.
     pub(super) notes: Vec<String>,
     pub(super) warnings: Vec<String>,
 }
@@ -47,7 +47,7 @@ pub(super) enum Model {
     },
 }
 
-/// What the plant file asks for.
+/// The choices for a new plant file.
 #[derive(Clone)]
 pub(super) struct Settings {
     /// The actuators that may be faulty.

@@ -10,7 +10,7 @@ use crate::Error;
 use crate::init::draft::{Draft, Identification, Model, shown};
 use plant_file::signals::Signal;
 
-/// The variables that are read.
+/// The variables of a MAT file that describe the plant.
 const READ: [&str; 5] = ["A", "B", "C", "D", "Ts"];
 
 /// Reads A, B and C, D if the file has it, and the sample time `Ts` if the matrices are sampled; warns of other numeric

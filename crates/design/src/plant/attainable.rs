@@ -12,11 +12,11 @@ use crate::report::number::rounded;
 use plant_file::PlantFile;
 use plant_file::requirements::{Bandwidth, Requirement};
 
-/// Real parts above this part of the modulus count as positive.
+/// Real part of a zero or pole, relative to its modulus, above which it counts as positive.
 const RIGHT: f64 = 1e-9;
 /// Peak of S above which a loop cannot be realised: its gains would be rounding errors.
 const NO_LOOP: f64 = 1e6;
-/// |S| is at most this up to the bandwidth.
+/// Largest |S| at frequencies up to the bandwidth, by the definition of the bandwidth.
 const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Returns warnings of a peak of S above the limit of a green verdict that no controller avoids, and of a feedback that

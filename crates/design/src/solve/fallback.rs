@@ -39,7 +39,7 @@ const FASTER: [f64; 3] = [1.0, 1.5, 2.25];
 /// The gains of the fall-back.
 #[derive(Clone)]
 pub(crate) struct Fallback {
-    /// m x n, for the states of the model in the observer.
+    /// The gain of the state feedback, m x n, for the states of the model in the observer.
     pub(crate) k_x: DMatrix<f64>,
     /// The gain of the compensation, m x q, if the loop with compensation meets the requirement in all cases.
     pub(crate) k_f: Option<DMatrix<f64>>,

@@ -17,7 +17,7 @@ pub(crate) struct GainResult {
     pub(crate) method: String,
     /// The required eigenvalues, if any, in the plane of the domain.
     pub(crate) required: Vec<Complex<f64>>,
-    /// The quality of an eigenvalue assignment.
+    /// Accuracy and conditioning of an eigenvalue assignment.
     pub(crate) quality: Option<Quality>,
     /// The H-infinity norm, if the gain minimises or bounds it.
     pub(crate) norm: Option<NormReport>,

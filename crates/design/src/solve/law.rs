@@ -16,9 +16,9 @@ use crate::report::robustness::Number;
 use plant_file::estimation::Law;
 use plant_file::faults::FaultDynamics;
 
-/// The default of `K_1`.
+/// Default of the parameter `K_1` of the learning law.
 const KEPT: f64 = 0.99;
-/// The default of rho, relative to the bound of the fault.
+/// Default of the parameter rho of the sliding-mode law, relative to the bound of the fault.
 const REACH: f64 = 2.0;
 
 /// Default ratio of the fast adaptive law's gamma to the mean rate, and of the mean rate to the sigma of the law.

@@ -33,13 +33,13 @@ const ROUNDED: f64 = 1.05;
 pub(crate) struct ObserverProblem<'a> {
     /// `A_0`, the dynamics of the plant with the models of its faults.
     pub(crate) a_0: &'a DMatrix<f64>,
-    /// `C_0`, the measurements of this plant.
+    /// `C_0`, from the states of this augmented system to the measurements.
     pub(crate) c_0: &'a DMatrix<f64>,
-    /// B of the plant with its filter.
+    /// B of the plant with its measurement filter.
     pub(crate) b: &'a DMatrix<f64>,
-    /// The estimates of each fault among the last states.
+    /// For each fault, its estimates among the last states.
     pub(crate) channels: &'a [FaultChannel],
-    /// Number of states of the fault models, the last states.
+    /// Number of states of the fault models, which are the last states.
     pub(crate) faults: usize,
     /// Coefficients of the measurement filter, whose states precede the states of the faults.
     pub(crate) filter: Option<&'a [f64]>,

@@ -47,9 +47,9 @@ pub(crate) struct Reconfigurations {
 pub(crate) struct Reconfiguration {
     pub(crate) actuator: usize,
     pub(crate) stuck_at: f64,
-    /// None if the fall-back is in force while this actuator is gone.
+    /// The gains; None if the fall-back is in force while this actuator is gone.
     pub(crate) gains: Option<ReconfiguredGains>,
-    /// The states of the fault model that restart at 0.
+    /// The states of the fault model that restart at 0 when the actuator is gone.
     pub(crate) restart: Vec<usize>,
     /// Threshold of the estimated loss, and the time in s above it after which the actuator counts as gone.
     pub(crate) decision: Option<(f64, f64)>,

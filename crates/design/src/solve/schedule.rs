@@ -24,7 +24,7 @@ use plant_file::variants::Variable;
 /// current estimator. The loop of a continuous controller has degree 2, with a direct term 4; the Bernstein
 /// coefficients of degree 4 are nearer to its values.
 const DEGREE: u32 = 4;
-/// [`DEGREE`] for a current estimator with a direct term: B `K_f` `P_f` C L C.
+/// [`DEGREE`] for a current estimator with direct feedthrough: the degree of B `K_f` `P_f` C L C.
 const DEGREE_OF_DIRECT_TERM: u32 = 6;
 
 /// The designs of a scheduled controller.
@@ -33,7 +33,7 @@ pub(crate) struct Scheduled {
     pub(crate) variable: Signal,
     /// The position of the scheduling variable among the measurements; None if it is an input.
     pub(crate) measurement: Option<usize>,
-    /// Largest rate of the variable, per s.
+    /// Largest rate of the scheduling variable, per s, if stated.
     pub(crate) rate_bound: Option<f64>,
     /// Values of the scheduling variable, ascending, with their designs; None as design for the plant of the file.
     points: Vec<(f64, Option<Solution>)>,

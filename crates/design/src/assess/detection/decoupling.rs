@@ -10,9 +10,9 @@ use crate::assess::detection::problem::Problem;
 use crate::plant::fixed_mode::shown;
 use plant_file::PlantFile;
 
-/// Time constants of the slowest mode after which a mean has settled.
+/// Number of time constants of the slowest mode after which the mean of the residuals has settled.
 const SETTLED: f64 = 15.0;
-/// The most samples of a response that are computed.
+/// Largest number of samples of a response of the residuals that are computed.
 const MOST_SAMPLES: usize = 20_000;
 /// Largest steady mean of the residuals that counts as no trace of a constant fault, relative to the largest mean or,
 /// if other faults are decoupled, to the steady mean without this decoupling.

@@ -6,12 +6,12 @@ use nalgebra::DMatrix;
 
 /// Largest number of samples over which a detection delay is computed, after the mean has settled.
 const MOST_SAMPLES: usize = 20_000;
-/// The probability with which the least fault is detected in time.
+/// Probability with which the least detectable fault must be detected in time.
 const POWER: f64 = 0.95;
 /// The largest factor of the size of a fault that is tried, and the number of bisections.
 const LARGEST: f64 = 1e3;
 const BISECTIONS: usize = 18;
-/// The longest window that is chosen.
+/// Longest window, in samples, that the choice of the window tries.
 const LONGEST: usize = 4096;
 
 /// A test of residuals.
@@ -71,7 +71,7 @@ impl TestKind {
 /// A test and the means of its residuals after a step of a fault.
 pub(super) struct Prediction<'a> {
     pub(super) kind: &'a TestKind,
-    /// Residuals x samples.
+    /// Mean of each residual at each sample, residuals x samples.
     pub(super) means: &'a DMatrix<f64>,
     /// Time between samples, s.
     pub(super) period: f64,

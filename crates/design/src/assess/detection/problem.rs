@@ -17,7 +17,7 @@ const NEARLY: f64 = 0.99;
 /// The plant of the residuals, in the time domain of the controller.
 pub(super) struct Problem {
     pub(super) plant: NoisyPlant,
-    /// The disturbances, then the faults.
+    /// The unknown inputs: disturbances, then faults.
     pub(super) inputs: Vec<UnknownInput>,
     pub(super) names: Vec<String>,
     /// The sizes of the inputs; None for a disturbance without a bound.
@@ -29,7 +29,7 @@ pub(super) struct Problem {
     pub(super) units: Vec<Option<String>>,
     /// Time between two tests, s.
     pub(super) period: f64,
-    /// The decay rate of the slowest eigenvalue under state feedback, 1/s.
+    /// Decay rate of the slowest eigenvalue under state feedback, 1/s, which the filter should reach.
     pub(super) rate: f64,
     pub(super) origin_of_process_noise: String,
 }

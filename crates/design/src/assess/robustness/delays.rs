@@ -8,7 +8,7 @@ use crate::report::number::rounded;
 use crate::report::robustness::{ExactDelays, Level, LoopPoint, Robustness};
 use crate::solve::solution::Solution;
 
-/// Frequencies in each decade.
+/// Number of frequencies of the grid in each decade.
 const PER_DECADE: u32 = 200;
 /// A peak of S that is larger by this factor with exact delays is a reason of the verdict.
 const LARGER: f64 = 1.05;

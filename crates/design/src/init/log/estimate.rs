@@ -21,11 +21,11 @@ const ORDERS: usize = 10;
 const MARGIN: f64 = 0.2;
 /// Least decrease of the sum of the logarithms of the errors for which a direct term D is assumed.
 const FEEDTHROUGH: f64 = 1.0;
-/// Errors below this part of the variance are rounding.
+/// Prediction error, as a part of the variance, below which the error counts as rounding.
 const ROUNDING: f64 = 1e-12;
 /// Number of blocks of the log; each is left out once to estimate the tolerance.
 const BLOCKS: usize = 10;
-/// The smallest tolerance that is stated.
+/// Smallest tolerance of the entries that the plant file states.
 const SMALLEST: f64 = 1e-3;
 
 /// The identified plant.
@@ -47,7 +47,7 @@ struct Assumption {
     past: usize,
     order: usize,
     feedthrough: bool,
-    /// The sum of the logarithms of errors on the samples that were not used.
+    /// Sum of the logarithms of the errors on the samples that were not used for the estimate.
     score: f64,
 }
 

@@ -8,13 +8,13 @@ use nalgebra::DMatrix;
 
 use crate::init::log::read::Log;
 
-/// A horizon, in samples, over which even an unstable plant can be predicted.
+/// Horizon in samples of the predictions whose fit is stated; even an unstable plant can be predicted this far.
 pub(super) const SHORT: usize = 20;
 
 /// Logarithm of the growth of an error over a simulation above which the simulation is not used.
 const GROWTH: f64 = 1.0;
 
-/// A variance below this part of the mean square of the samples is rounding.
+/// Variance, as a part of the mean square of the samples, below which the variance counts as rounding.
 const ROUNDING: f64 = 1e-15;
 
 /// The fit of one measurement, 100 % for predictions without error, 0 for predictions as good as the mean.

@@ -10,15 +10,15 @@ use crate::init::log::fit::{Fit, estimation, validation};
 use crate::init::log::read::Log;
 use plant_file::signals::Signal;
 
-/// The fewest samples of a log.
+/// Smallest number of samples of a log from which a plant is identified.
 const SAMPLES: usize = 100;
-/// Changes below this part of the value are rounding.
+/// Relative change of a signal below which the signal counts as constant.
 const CONSTANT: f64 = 1e-12;
 /// Singular values of the inputs below this part of the largest do not excite the plant.
 const EXCITATION: f64 = 1e-4;
-/// A fit, in per cent, below which a model is doubtful.
+/// Fit in per cent below which the identified model gets a warning.
 const POOR_FIT: f64 = 60.0;
-/// A tolerance above which a model is doubtful.
+/// Tolerance of the entries above which the identified model gets a warning.
 const LARGE_TOLERANCE: f64 = 0.3;
 /// |eigenvalue| times sample time above which a mode is too fast for the samples.
 const FAST: f64 = 2.5;

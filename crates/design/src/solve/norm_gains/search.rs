@@ -12,7 +12,7 @@ use crate::solve::norm_gains::NormRequirement;
 use plant_file::channel::{Channel, ChannelWeight};
 use plant_file::requirements::Region;
 
-/// Relative accuracy of a norm.
+/// Relative accuracy with which the H-infinity norm of a loop is computed.
 pub(crate) const WIDTH: f64 = 1e-4;
 /// Largest number of states for which bounds are proven and the norm without the region is computed.
 pub(crate) const LARGEST_ORDER: usize = 30;
@@ -26,7 +26,7 @@ pub(crate) type Synthesise<'a> =
 /// The search for a gain by its norm, the same for observer and feedback.
 pub(crate) struct Search<'a> {
     pub(crate) synthesise: &'a Synthesise<'a>,
-    /// The closed loop of a gain, from w to z of a performance.
+    /// Returns the closed loop with a gain, from the inputs w to the outputs z of a performance.
     pub(crate) system: &'a dyn Fn(&DMatrix<f64>, &Performance) -> StateSpace,
     pub(crate) performance: Performance,
     /// The weights over frequency.

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-/// Up to this number of parameters, all corners are tried.
+/// Largest number of parameters with which all corners are tried.
 const ALL_CORNERS: usize = 6;
 /// With more than [`ALL_CORNERS`] parameters: largest number of rounds, in which each moves to its worse limit.
 const ROUNDS: usize = 10;
@@ -12,9 +12,9 @@ const STEPS: [f64; 4] = [0.5, 0.25, 0.125, 0.0625];
 /// The largest values that were found in the box of deviations -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LargestValue {
-    /// At the corners, the centre and the centres of faces.
+    /// Largest value at the corners, the centre and the centres of faces.
     pub(super) corners: f64,
-    /// At all points that were tried.
+    /// Largest value at all points that were tried.
     pub(super) everywhere: f64,
 }
 
