@@ -17,7 +17,7 @@ const BUS_ERROR: u32 = 0x31;
 const CONFIGURATION: u32 = 0x40;
 /// Parameter of a configuration: the bit rate of classical CAN.
 const BIT_RATE: u8 = 1;
-/// Number of bytes of the code and the length, with which an operation starts.
+/// Number of bytes of code and length, the start of each operation.
 const HEADER: usize = 8;
 
 /// An operation.

@@ -6,7 +6,7 @@ use crate::description::{Causality, Kind, ModelDescription, Output, Tag};
 pub use crate::terminal::{Terminal, TerminalMember};
 pub use read::read;
 
-/// The path in the archive.
+/// The path of the terminals in the archive of an FMU.
 pub const PATH: &str = "terminalsAndIcons/terminalsAndIcons.xml";
 
 /// Renders the terminals of a model: one bus, `signals`, with its inputs and outputs, except clocks, as members;

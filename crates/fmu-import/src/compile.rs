@@ -175,7 +175,7 @@ fn content(unpacked: &Unpacked) -> Result<Package, CompileError> {
 struct Compiler {
     /// The program of the compiler and the program's arguments.
     words: Vec<OsString>,
-    /// The output of `--version`.
+    /// The output of the compiler's option `--version`, a part of the cache key.
     version: String,
 }
 

@@ -41,16 +41,16 @@ const EXIT: i32 = -1;
 const GIVEN_UP: i32 = -2;
 const UNWOUND: i32 = -3;
 const OVERDUE: i32 = -4;
-/// The argument of `exit`.
+/// The argument of `exit`, for the report of an unexpected `exit`.
 static STATUS: AtomicI32 = AtomicI32::new(0);
-/// The time in ms that [`give_up`] states; 0: none.
+/// The time in ms that [`give_up`] states; 0 without such a time.
 static WAITED: AtomicU64 = AtomicU64::new(0);
 /// The address of the slot that the crashed thread entered last.
 static PLACE: AtomicUsize = AtomicUsize::new(0);
 /// The name in reports of an activity that is no function of the standard. The dynamic linker is locked during this
 /// activity: no other thread can start or register destructors of thread-local data.
 pub(crate) const LOADING: &str = "loading the library";
-/// Like [`LOADING`].
+/// The name of unloading in reports, used like [`LOADING`].
 pub(crate) const UNLOADING: &str = "unloading the library";
 
 /// The thread that runs the program's crash function.

@@ -31,7 +31,7 @@ const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 /// Number of 64-bit words that both processes share for the program: 2 MiB, of which the system allocates only the
 /// pages that are used.
 const WORDS: usize = 1 << 18;
-/// The words that both processes share.
+/// The memory that the program and its supervisor share.
 static MEMORY: OnceLock<&'static [AtomicU64]> = OnceLock::new();
 
 /// The end of the process of the program.
@@ -66,7 +66,7 @@ pub struct Ended {
     pub status: Option<u8>,
     /// The calls of FMUs that had not returned at the end.
     pub calls: Vec<Call>,
-    /// Whether the first step had started.
+    /// Whether the first communication step had started.
     pub has_begun_steps: bool,
 }
 
@@ -148,7 +148,7 @@ fn end_with(supervisor: Pid) {
 /// The blocked signals for which the supervisor waits.
 struct Signals {
     set: sigset_t,
-    /// The signals that were blocked before.
+    /// The signals that were blocked before, to be restored.
     former_mask: sigset_t,
 }
 

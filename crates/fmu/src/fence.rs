@@ -26,7 +26,7 @@ type Hook = Box<dyn Fn(&PanicHookInfo<'_>) + Send + Sync>;
 
 /// The state that the hook and the fences of one thread share.
 struct Fence {
-    /// Depth of nested fences.
+    /// Number of nested fences on this thread.
     depth: Cell<u32>,
     /// The last panic inside a fence. This value is never dropped with the thread: a destructor in thread-local storage
     /// would keep the library loaded until the thread ends.
@@ -34,7 +34,7 @@ struct Fence {
 }
 
 struct Panic {
-    /// File, line and column.
+    /// File, line and column of the panic.
     place: String,
     text: String,
 }

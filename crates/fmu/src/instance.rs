@@ -68,7 +68,7 @@ pub(crate) struct Instance<M: Model> {
     callbacks: Callbacks,
     /// Whether messages of the model that are no warnings are sent.
     debug_logging: bool,
-    /// Messages of the model that are not sent yet.
+    /// Messages of the model that have not been sent to the importer.
     messages: Vec<Message>,
     /// Log categories selected by `fmi2SetDebugLogging`; `None` selects all.
     categories: Option<Vec<String>>,

@@ -26,7 +26,7 @@ const LIMIT: usize = 1000;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Log {
     messages: Vec<Message>,
-    /// Number of messages that were dropped.
+    /// Number of messages dropped because of [`LIMIT`].
     dropped: usize,
 }
 

@@ -18,9 +18,9 @@ const ITERATION_LIMIT: u32 = 1000;
 /// End of a step that stops at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stop {
-    /// The time in s.
+    /// The time reached, in s.
     pub(crate) time: f64,
-    /// Whether an event is to be handled there.
+    /// Whether an event is to be handled at this time.
     pub(crate) is_event: bool,
 }
 

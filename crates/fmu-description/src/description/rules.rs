@@ -37,7 +37,7 @@ struct Sections {
     categories: &'static str,
     experiment: &'static str,
     variables: &'static str,
-    /// Limits and start values.
+    /// Section with the rules on limits and start values.
     limits: &'static str,
     names: &'static str,
     structure: &'static str,

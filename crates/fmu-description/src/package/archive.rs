@@ -27,7 +27,7 @@ const BASE: u64 = 64 << 20;
 /// deflate reaches 1032.
 const RATIO: u64 = 100;
 
-/// Size of the buffer between unpacking and writing, in bytes.
+/// Size in bytes of the buffer between unpacking and writing.
 const BUFFER: usize = 1 << 20;
 
 /// The reason for refusing an archive with two entries of the same name.

@@ -14,11 +14,11 @@ use quick_xml::reader::Reader;
 use crate::defect::{ParseError, Position};
 use crate::limits::{HELP, exceeds};
 
-/// Maximum nesting; a model description needs 5.
+/// Maximum depth of nested elements; a model description needs 5.
 const DEPTH: usize = 64;
 /// Maximum number of attributes of one element; the standard has fewer than 30.
 const ATTRIBUTES: usize = 256;
-/// Maximum number of elements; an output needs 4.
+/// Maximum number of elements of a file; an output of a model description needs 4.
 const ELEMENTS: usize = 4_000_000;
 /// Maximum number of attributes of all elements together.
 const ALL_ATTRIBUTES: usize = 12_000_000;

@@ -9,7 +9,7 @@ use super::{OVERDUE, REPORTER, start_report};
 
 /// A time limit that ends the process as a crash does, unless it is dropped in time.
 pub(crate) struct Limit {
-    /// Whether the limit has been dropped.
+    /// Whether the limit has been dropped, so that the process goes on.
     ended: Arc<AtomicBool>,
     thread: JoinHandle<()>,
 }

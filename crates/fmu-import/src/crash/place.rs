@@ -15,7 +15,7 @@ use slave::{CallError, Failure};
 
 use super::Call;
 
-/// Number of instances with a slot of their own.
+/// Number of instances that can have a separate slot in the record.
 const SLOT_COUNT: usize = 4096;
 /// Bytes of an instance's name that reports show.
 const NAME_LENGTH: usize = 96;
@@ -106,7 +106,7 @@ pub(crate) struct Slot {
     is_used: AtomicBool,
     /// The function that the instance executes; null between calls.
     function: AtomicPtr<&'static str>,
-    /// Number of calls so far.
+    /// Number of calls that the instance has made.
     calls: AtomicU64,
     /// Bits of the time of the instance, in s.
     time: AtomicU64,

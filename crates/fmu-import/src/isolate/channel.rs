@@ -17,7 +17,7 @@ use super::layout::Shared;
 const SPINS: u32 = 10;
 /// Time for which a wait yields the processor before the thread blocks.
 const YIELD_TIME: Duration = Duration::from_micros(60);
-/// A yield that takes this long shows that other programs use the processor.
+/// Duration of a yield that shows that other programs use the processor.
 const CONTENDED: Duration = Duration::from_micros(500);
 /// Number of waits without yields after a yield of [`CONTENDED`].
 const WAITS_WITHOUT_YIELD: u32 = 50;

@@ -29,7 +29,7 @@ use slave::{CallError, Failure};
 const SLICE: Duration = Duration::from_millis(100);
 /// Time limit for the end of a worker that has closed the connection.
 const END_LIMIT: Duration = Duration::from_secs(2);
-/// Time limit of `fmi2FreeInstance` if the calls have no limit.
+/// Time limit of `fmi2FreeInstance` if the calls of the instance have no limit.
 const FREE_LIMIT: Duration = Duration::from_secs(10);
 /// Time limit for a new process to become a worker.
 const START_LIMIT: Duration = Duration::from_secs(20);
@@ -47,9 +47,9 @@ pub struct Isolated {
     pub(super) place: Arc<Place>,
     /// The last known turn: odd while a command is pending.
     turn: u64,
-    /// When the time limit of the next wait starts; `None`: when the wait starts.
+    /// Start of the time limit of the next wait; `None` if the limit starts with the wait.
     posted_at: Option<Instant>,
-    /// Why the worker ended; `None` while it runs.
+    /// The cause of the worker's end; `None` while the worker runs.
     ended: Option<Failure>,
     /// Whether the worker has been asked to free the instance.
     freed: bool,
@@ -57,7 +57,7 @@ pub struct Isolated {
     memory_limit: Option<u64>,
     /// Longest wait between two checks: the read timeout of the socket.
     slice: Duration,
-    /// When the process was started.
+    /// Time at which the process was started.
     started: Instant,
     /// The bytes of a request or an answer, kept so that small messages need no allocation.
     pub(super) message: Vec<u8>,

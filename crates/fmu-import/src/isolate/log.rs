@@ -20,15 +20,15 @@ use slave::CallError;
 
 /// The `target` of `tracing` events that carry messages of an FMU.
 const TARGET: &str = "fmu";
-/// Maximum number of bytes of a category; the rest is cut off.
+/// Maximum number of bytes of the category of a message; further bytes are cut off.
 const CATEGORY: usize = 256;
-/// Maximum number of bytes of a text; the rest is cut off.
+/// Maximum number of bytes of the text of a message; further bytes are cut off.
 const TEXT: usize = 4096;
-/// Maximum number of messages kept for an error.
+/// Maximum number of recent messages that are kept to explain an error.
 const KEPT: usize = 10;
 /// Maximum number of messages logged in one [`WINDOW`].
 const MESSAGES: u32 = 1000;
-/// Maximum number of bytes of messages logged per instance.
+/// Maximum number of bytes of all messages that are logged for an instance.
 const BYTES: usize = 16 << 20;
 /// Interval in which at most [`MESSAGES`] are logged; also the interval of reports of the number of lost messages.
 const WINDOW: Duration = Duration::from_secs(1);
@@ -40,7 +40,7 @@ const LEVELS: [Level; 5] = [Level::ERROR, Level::WARN, Level::INFO, Level::DEBUG
 /// Sends the [`tracing`] events with messages of the FMU from the worker to the master.
 pub(super) struct Forward {
     shared: Arc<Shared>,
-    /// Number of words written.
+    /// Number of words written to the message ring.
     head: Mutex<u64>,
 }
 
@@ -152,13 +152,13 @@ impl Visit for Message {
 
 /// Limits the number of messages of an FMU that are logged in a [`WINDOW`], and the number of their bytes in total.
 struct Quota {
-    /// Start of the window.
+    /// Start of the present window.
     since: Instant,
-    /// Number of messages logged in the window.
+    /// Number of messages logged in the present window.
     messages: u32,
     /// Number of bytes logged in total.
     bytes: usize,
-    /// Number of lost messages that has not been reported.
+    /// Number of lost messages that have not been reported.
     lost: u64,
 }
 
@@ -210,9 +210,9 @@ impl Drop for Inbox {
 #[derive(Default)]
 pub(super) struct Inbox {
     instance: String,
-    /// Number of words read.
+    /// Number of words read from the message ring.
     tail: u64,
-    /// Number of dropped messages that are counted as lost.
+    /// Number of messages dropped by the worker that are already counted as lost.
     dropped: u64,
     quota: Quota,
     /// The last messages, at most [`KEPT`], since the last [`Inbox::take`] or [`Inbox::clear`].

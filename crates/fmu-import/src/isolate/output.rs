@@ -4,7 +4,7 @@ use std::io::{self, PipeReader, PipeWriter, Read as _, Write as _};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-/// Maximum number of bytes forwarded per worker.
+/// Maximum number of bytes of output forwarded for one worker.
 const MAX_BYTES: u64 = 1 << 20;
 /// Time limit for the last output of a worker that has ended. A process that left the worker's group may hold the pipe
 /// open for ever.

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicU64;
 use memmap2::{MmapOptions, MmapRaw};
 use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, fcntl_get_seals, memfd_create};
 
-/// Bytes of a word.
+/// Number of bytes of a word.
 const WORD: usize = size_of::<AtomicU64>();
 
 /// A mapping of an anonymous file with sealed length (`memfd`).

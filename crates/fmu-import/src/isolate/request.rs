@@ -96,7 +96,7 @@ pub(super) struct Open<'a> {
     pub(super) logging: bool,
     pub(super) strict_binding: bool,
     pub(super) guard_arrays: bool,
-    /// Bytes; 0: no limit.
+    /// Memory limit of the worker in bytes; 0 for no limit.
     pub(super) memory_limit: u64,
     #[serde(borrow)]
     pub(super) preload: Vec<&'a [u8]>,

@@ -15,7 +15,7 @@ use slave::{CallError, Failure};
 
 /// Maximum number of bytes of an answer.
 const MAX_ANSWER: u64 = u32::MAX as u64;
-/// Bytes of memory kept for the next message.
+/// Number of bytes of memory that stay allocated for the next message.
 const BUFFER: usize = 1 << 16;
 
 impl Isolated {

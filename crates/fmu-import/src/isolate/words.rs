@@ -5,7 +5,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes in a word.
+/// Number of bytes in a word.
 const BYTES: usize = 8;
 
 /// A type that is encoded in one word.

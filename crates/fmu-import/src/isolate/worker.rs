@@ -41,7 +41,7 @@ const PARENT_CHECK: Duration = Duration::from_millis(100);
 const NO_INTEGRATOR: &str = "this program cannot integrate model-exchange FMUs in separate processes: \
     its `main` must call `fmu_import::isolate::worker_with` where it calls `worker`";
 
-/// Bytes of memory kept for the next request and for its answer.
+/// Number of bytes that stay allocated for the next request and for its answer.
 const BUFFER: usize = 1 << 16;
 
 /// Runs this process as a worker of the master that started it. Returns when the master frees the instance or closes

@@ -51,7 +51,7 @@ pub(crate) struct Base<F> {
     pub(crate) time_limit: Option<Duration>,
     /// Whether the instance still computes a step that could not be canceled, so that the instance must not be freed.
     pub(super) abandoned: bool,
-    /// Whether a call has returned `fmi2Warning`.
+    /// Whether a call has returned `fmi2Warning` since the last [`Base::take_warning`].
     warned: Cell<bool>,
     /// Whether calls pass copies of arrays with canaries to the FMU, to detect writes outside an array.
     pub(super) guards: bool,

@@ -8,7 +8,7 @@ use std::ffi::c_int;
 
 use slave::Failure;
 
-/// Number of elements before and after a copy.
+/// Number of elements of the margin before and after a copy of an array.
 const MARGIN: usize = 8;
 /// The value of every byte in the margins around a copy.
 const PATTERN: u8 = 0xa5;

@@ -3,7 +3,7 @@
 
 use std::ffi::c_char;
 
-/// Maximum number of bytes read.
+/// Maximum number of bytes read from a string of an FMU.
 const MOST: usize = 1024;
 
 /// Returns the text at `pointer`, up to the first unreadable page; `None` if `pointer` is null or

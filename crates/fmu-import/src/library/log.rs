@@ -11,7 +11,7 @@ use tracing::Level;
 use super::foreign;
 use crate::crash::{Place, last_of_this_thread};
 
-/// Maximum number of messages kept for an error.
+/// Maximum number of recent messages that are kept to explain an error.
 const KEPT: usize = 10;
 
 /// The message receivers of all instances of this process.
@@ -30,7 +30,7 @@ pub(crate) type Names = Arc<dyn Fn(char, u32) -> Option<String> + Send + Sync>;
 /// never dereferenced, because some FMUs pass null or another pointer.
 pub(super) struct Sink {
     place: Arc<Place>,
-    /// `None`: messages have no references to variables (FMI 3.0).
+    /// Lookup of variable names; `None` if messages have no references to variables (FMI 3.0).
     names: Option<Names>,
     messages: Mutex<VecDeque<String>>,
 }

@@ -14,7 +14,7 @@ use crate::crash::call_of_this_thread;
 /// `struct link_map` of `<link.h>`, as far as it is public.
 #[repr(C)]
 struct LinkMap {
-    /// Difference between the addresses in the file and in memory.
+    /// Difference between the addresses of the library in memory and in the file.
     address: usize,
     name: *const c_char,
     dynamic: *const Dynamic,

@@ -55,7 +55,7 @@ pub(crate) type Library = Loaded<Functions>;
 /// The arguments of the function that creates an instance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Instantiation<'a> {
-    /// Selects the function.
+    /// The interface of the instance, which selects the C function.
     pub(crate) interface: Interface,
     /// `instanceName`.
     pub(crate) name: &'a str,

@@ -19,9 +19,9 @@ pub(super) type Memory = BTreeMap<usize, ElementValue>;
 /// The calls for all clocked variables of an FMU.
 #[derive(Debug, Default)]
 pub(super) struct ClockedRuns {
-    /// Inputs, one variable in each.
+    /// Runs of clocked inputs, one variable in each run.
     inputs: Vec<Run>,
-    /// Outputs and locals.
+    /// Runs of clocked outputs and local variables.
     others: Vec<Run>,
 }
 

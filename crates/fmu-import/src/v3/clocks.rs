@@ -31,7 +31,7 @@ struct TimedClock {
     reference: u32,
     #[serde(skip)]
     attributes: ClockType,
-    /// Interval in s; for an aperiodic clock the last one.
+    /// Interval in s; for an aperiodic clock the last interval.
     interval: f64,
     /// The interval as numerator and denominator, so that many ticks do not drift.
     #[serde(skip)]
@@ -51,7 +51,7 @@ struct TimedClock {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Clocks {
     timed: Vec<TimedClock>,
-    /// Triggered input clocks.
+    /// Value references of the triggered input clocks.
     #[serde(skip)]
     triggered: Vec<u32>,
     #[serde(skip)]

@@ -7,13 +7,13 @@ use fmu_description::NativeType;
 use super::buffer::Buffer;
 use super::elements::{ElementView, Variable};
 
-/// Largest number of lists whose plans are kept.
+/// Largest number of lists of value references whose plans are kept.
 const KEPT: usize = 32;
 
 /// The calls for one list of value references.
 #[derive(Debug)]
 struct Plan {
-    /// The list.
+    /// Value references in the list.
     references: Vec<u32>,
     runs: Vec<Run>,
 }
@@ -108,7 +108,7 @@ impl Run {
 #[derive(Debug, Default)]
 pub(super) struct Plans {
     plans: Vec<Plan>,
-    /// Position of the plan that the next new one replaces, if there are [`KEPT`].
+    /// Position of the plan that the next new plan replaces, if there are [`KEPT`].
     next: usize,
 }
 

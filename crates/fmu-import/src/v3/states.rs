@@ -9,7 +9,7 @@ use super::clocks::Clocks;
 use super::modes::Mode;
 use crate::error::refused;
 
-/// The first bytes of a serialised state: name and version of its format.
+/// The first bytes of a serialised state: name and version of the format.
 const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x04";
 const SERIALIZE: &str = "fmi3SerializeFMUState";
 const DESERIALIZE: &str = "fmi3DeserializeFMUState";

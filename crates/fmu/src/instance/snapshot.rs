@@ -9,9 +9,9 @@ use fmu_description::call_order::{InterfaceType, State};
 
 /// First bytes of a serialised state; the last two digits are the version of the layout.
 const MAGIC: &[u8; 8] = b"FMI2ST04";
-/// Length of magic, GUID and layout.
+/// Length in bytes of magic bytes, GUID and layout.
 const HEAD: usize = MAGIC.len() + size_of::<Guid>() + size_of::<Layout>();
-/// Length of the checksum at the end.
+/// Length in bytes of the checksum at the end.
 const CHECKSUM: usize = 4;
 
 /// The target of `fmi2FMUstate`.

@@ -9,7 +9,7 @@ use fmu_description::{DependencyKind, ModelStructure, NativeType, Unknown};
 
 pub(crate) use describe::describe;
 
-/// Marks the place of an event indicator.
+/// Bit that marks the place of an event indicator.
 pub(crate) const INDICATOR: u32 = 1 << 31;
 
 /// Bit that marks the place of an `Int64`, to distinguish it from the place of an enumeration.
@@ -22,7 +22,7 @@ pub(crate) struct Entry {
     pub(crate) kind: NativeType,
     /// The place ([`Table`]) of the first element; the places of further elements follow.
     first: u32,
-    /// Number of elements.
+    /// Number of elements of the variable.
     count: u32,
     /// Whether the variable must not be set: its value is that of another variable, and it has no start value.
     is_calculated: bool,

@@ -6,7 +6,7 @@ use super::indicators::Indicators;
 use super::{Crossing, Step, search};
 use crate::model::Failure;
 
-/// Relative tolerance unless [`Integrator::set_tolerance`] sets another one.
+/// Default of the relative tolerance, see [`Integrator::set_tolerance`].
 pub(crate) const TOLERANCE: f64 = 1e-6;
 
 /// Absolute tolerance of a state, divided by the relative tolerance and the nominal value of the state:
@@ -70,10 +70,10 @@ pub struct Integrator {
     /// Length in s that is suggested for the next step.
     suggested: f64,
     indicators: Indicators,
-    /// Space for a state and its derivative.
+    /// Buffers for a state and its derivative.
     state: Vec<f64>,
     slope: Vec<f64>,
-    /// Space for the indicators at the end of a step.
+    /// Buffer for the indicators at the end of a step.
     values: Vec<f64>,
 }
 

@@ -6,7 +6,7 @@ use crate::defect::Warning;
 use crate::description::Version;
 use crate::xml::tree::Element;
 
-/// Maximum number of warnings; one more states that there are others.
+/// Maximum number of warnings; a last warning states that there are others.
 const MOST: usize = 1000;
 
 /// Collects warnings.

@@ -9,7 +9,7 @@ use std::ptr;
 
 use super::functions::Instance;
 
-/// The largest order of a derivative.
+/// Largest supported order of an input derivative.
 pub(crate) const ORDERS: usize = 3;
 
 type SetFloat64 = unsafe extern "C" fn(Instance, *const u32, usize, *const f64, usize) -> c_int;
@@ -48,7 +48,7 @@ pub(super) struct Inputs {
     derivatives: Vec<[f64; ORDERS]>,
     /// Position of the first element of each input, by value reference.
     index: HashMap<u32, usize>,
-    /// Buffer for the values at a time within the step.
+    /// Buffer for the values of the inputs at a time within the step.
     present: Vec<f64>,
     /// The instance that steps, and its function to set inputs; `None` outside a step.
     target: Option<(Instance, SetFloat64)>,

@@ -8,7 +8,7 @@ pub(super) struct Block {
     /// Position of the first scalar, and number of scalars.
     pub(super) start: usize,
     pub(super) count: usize,
-    /// Extents; empty for a scalar.
+    /// Extents of the array; empty for a scalar.
     pub(super) extents: Vec<u64>,
 }
 
