@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 /// Largest number of bytes of request line and headers.
 const HEAD: usize = 8 << 10;
-/// Largest number of headers.
+/// Largest number of headers of a request.
 const HEADERS: usize = 64;
-/// Largest number of bytes of the body.
+/// Largest number of bytes of the body of a request.
 const BODY: usize = 64 << 10;
 
 /// A request of HTTP/1.1.
@@ -16,7 +16,7 @@ const BODY: usize = 64 << 10;
 pub(crate) struct HttpRequest {
     pub(crate) method: String,
     pub(crate) path: String,
-    /// The part after the question mark.
+    /// The part of the target after the question mark.
     pub(crate) query: String,
     pub(crate) host: Option<String>,
     pub(crate) origin: Option<String>,

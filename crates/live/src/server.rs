@@ -14,9 +14,9 @@ use crate::routes::Site;
 
 /// Largest number of simultaneous connections; a further one is closed at once.
 const CONNECTIONS: usize = 24;
-/// Time for receiving a request.
+/// Time limit for receiving a request.
 const REQUEST_TIME: Duration = Duration::from_secs(2);
-/// Time for sending an answer.
+/// Time limit for sending an answer.
 const ANSWER_TIME: Duration = Duration::from_secs(5);
 /// Pause after a connection that could not be accepted, for example because there are too many open files.
 const REST: Duration = Duration::from_millis(50);

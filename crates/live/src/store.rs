@@ -6,23 +6,23 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// Largest number of rows kept.
+/// Largest number of rows that the server keeps.
 const MOST_ROWS: usize = 4000;
 /// Number of rows that are kept even if they have more than [`VALUES`] values.
 const LEAST_ROWS: usize = 100;
-/// Largest number of values in all rows.
+/// Largest number of values in all rows that the server keeps.
 const VALUES: usize = 1_000_000;
 /// Largest number of messages that are kept, and that one answer contains.
 const MESSAGES: usize = 1000;
 /// Largest number of signals in one answer.
 pub(crate) const SHOWN: usize = 32;
-/// A page that has sent no request for longer than this counts as closed.
+/// Time without a request after which a page counts as closed.
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// The state of a run at a communication point.
 #[derive(Clone, Debug, Default)]
 pub struct Sample {
-    /// Time in s.
+    /// Simulated time of the sample in s.
     pub time: f64,
     /// Values of [`crate::Facts::signals`]; a sample with another number of values adds no row.
     pub values: Vec<f64>,
@@ -86,7 +86,7 @@ pub(crate) struct Store {
     last: Sample,
     /// Number of the last row.
     row_number: u64,
-    /// The last messages.
+    /// The last messages, at most [`MESSAGES`].
     messages: VecDeque<Message>,
     /// Number of all messages so far.
     message_count: u64,

@@ -19,7 +19,7 @@ use crate::store::{Event, Sample, Store};
 const EVENTS: usize = 4096;
 /// Largest number of requests that wait for the run.
 const REQUESTS: usize = 32;
-/// Interval between two checks whether the page has received the end.
+/// Interval between two checks whether the page has received the outcome.
 const LOOK: Duration = Duration::from_millis(20);
 
 /// Sends messages to the page, from any thread. Messages that the server cannot take at once are dropped and counted.

@@ -34,7 +34,7 @@ pub struct AlgorithmRequest {
     pub step_control: Option<StepControl>,
     /// Communication step in s.
     pub step: Option<f64>,
-    /// Relative tolerance.
+    /// Relative tolerance of iteration and step control.
     pub relative_tolerance: Option<f64>,
     /// Absolute tolerance, as a fraction of nominal values.
     pub absolute_tolerance: Option<f64>,

@@ -44,7 +44,7 @@ pub(crate) struct Iterated {
     pub(crate) iteration: Iteration,
     /// Connected values that the slaves assume at the end of the step.
     u: Vec<f64>,
-    /// Connected values that the slaves compute there.
+    /// Connected values that the slaves compute at the end of the step.
     g: Vec<f64>,
     /// Connected values of the next evaluation.
     next: Vec<f64>,
@@ -66,7 +66,7 @@ pub(crate) struct Iterated {
 pub struct Fallbacks {
     /// Number of communication steps whose iteration failed. A step that step control or an event repeats counts once.
     pub count: u64,
-    /// Reason and time of the first failure; empty if there is none.
+    /// Reason and time of the first failure; empty without a failure.
     pub first: String,
 }
 

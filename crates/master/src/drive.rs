@@ -70,7 +70,7 @@ pub struct Drive {
     source: DriveSource,
     faults: Option<FaultChain>,
     cursor: Cursor,
-    /// The sample set last.
+    /// The sample that the FMU received last.
     written: Option<Sample>,
     /// The value of `written` at the last commit.
     accepted: Option<Sample>,

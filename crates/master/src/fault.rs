@@ -20,7 +20,7 @@ use stage::Stage;
 pub struct Window {
     /// Start time in s.
     pub from: f64,
-    /// End time in s; `None`: the fault stays.
+    /// End time in s; `None` for a fault without end.
     pub until: Option<f64>,
 }
 

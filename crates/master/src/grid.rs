@@ -32,7 +32,7 @@ pub(crate) struct Grid {
 /// is within one of its steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EarlyEnd {
-    /// Name of the FMU.
+    /// Name of the FMU that takes equal steps only.
     pub slave: String,
     /// The step of the FMU in s.
     pub step: f64,

@@ -10,7 +10,7 @@ use slave::{Transformation, Value};
 
 /// Default of [`Limits::rounding`] for a floating-point type; a type with a coarser precision has a larger value.
 const ROUNDING: f64 = 1e-9;
-/// Largest number of variables and of items that a warning names, and of connected inputs that are reported.
+/// Largest number of variables, of items of an enumeration, and of connected inputs that warnings name.
 const NAMED: usize = 5;
 /// Digits of a value in a message.
 const DIGITS: usize = 6;

@@ -32,9 +32,9 @@ pub(crate) struct SizeControl {
     pub(crate) scale: Scale,
     /// For each power bond, the indices of the outputs at the other ends of its connections.
     bonds: Vec<(usize, usize)>,
-    /// Order of the method, used to compare a whole step with two halves.
+    /// Order of the coupling method, for the comparison of a whole step with two half steps.
     order: i32,
-    /// The errors of the extrapolated outputs.
+    /// Errors of the extrapolated outputs, for the estimate of the step error.
     errors: Vec<f64>,
     /// The extrapolated outputs at the end of a step.
     predicted: Vec<f64>,
@@ -360,7 +360,7 @@ fn is_break(engine: &Engine, time: f64) -> bool {
     engine.next_breaks(just_before(time)).any(|next| near(next, time))
 }
 
-/// Number of steps between two checks of the pace.
+/// Number of steps between two checks whether the run can reach its stop time.
 const PACE_INTERVAL: u32 = 1000;
 /// Limits of the check: the mean size of the steps as a multiple of the smallest step, and the
 /// estimated number of remaining steps. The run ends if the mean is smaller and the number larger.
@@ -369,9 +369,9 @@ const MOST_REMAINING_STEPS: f64 = 1e7;
 
 /// Checks whether steps of variable size are large enough to reach the end of the run.
 pub(crate) struct Pace {
-    /// The smallest step in s.
+    /// The smallest step in s that the step control may choose.
     smallest: f64,
-    /// Number of steps since the last check of the pace.
+    /// Number of steps since the last check.
     steps: u32,
     length: f64,
 }

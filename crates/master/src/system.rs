@@ -40,7 +40,7 @@ pub struct Connection {
 /// Slaves and their connections.
 #[derive(Default)]
 pub struct System {
-    /// Name and instance, in the order of their addition.
+    /// Name and instance of each slave, in the order in which they were added.
     pub slaves: Vec<(String, Box<dyn Slave>)>,
     /// The connections.
     pub connections: Vec<Connection>,

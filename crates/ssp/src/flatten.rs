@@ -24,7 +24,7 @@ pub(super) struct Edge {
     conversion: Conversion,
     /// The system that contains the connection.
     system: usize,
-    /// Position in the file of that system.
+    /// Position of the connection in the file of that system.
     at: Position,
 }
 

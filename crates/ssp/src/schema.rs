@@ -11,9 +11,9 @@ macro_rules! names {
     ($($name:ident)*) => { [$(stringify!($name)),*] };
 }
 
-/// Attributes of every element.
+/// Attributes that every element may have.
 const ANYWHERE: [&str; 2] = ["id", "description"];
-/// Additional attributes of root elements.
+/// Attributes that root elements may have besides [`ANYWHERE`].
 const TOP: [&str; 8] = names! {
     version name author fileversion copyright license generationTool generationDateAndTime
 };

@@ -194,7 +194,7 @@ pub struct Connection {
 pub struct End {
     /// Name of the element; `None` for the system itself.
     pub element: Option<String>,
-    /// The connector.
+    /// Name of the connector.
     pub connector: String,
 }
 
@@ -211,7 +211,7 @@ impl std::fmt::Display for End {
 /// transformation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Conversion {
-    /// The transformation, if there is one.
+    /// The transformation of the value, if stated.
     pub transformation: Option<Transformation>,
     /// `suppressUnitConversion`.
     pub suppress_units: bool,

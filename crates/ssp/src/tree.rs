@@ -43,7 +43,7 @@ pub(super) struct Node {
     pub(super) dictionaries: HashMap<String, usize>,
     /// The file that declares the connectors and connections.
     pub(super) file: Rc<File>,
-    /// Position of the element in that file.
+    /// Position of the element in the file of its system.
     pub(super) at: Place,
     pub(super) connectors: Vec<Connector>,
     /// Positions of the connectors by name.
@@ -77,7 +77,7 @@ pub(super) enum Content {
 pub(super) struct File {
     /// Name of the file for messages.
     pub(super) shown: PathBuf,
-    /// The folder that relative URIs in the file start from.
+    /// The folder at which relative URIs in the file start.
     pub(super) base: Base,
     pub(super) definitions: Definitions,
 }

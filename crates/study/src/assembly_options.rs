@@ -10,7 +10,7 @@ use crate::table::Table;
 /// Options of [`crate::assemble()`] that are not part of the configuration.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AssemblyOptions<'a> {
-    /// Whether the FMUs log everything.
+    /// Whether the FMUs log messages of all categories.
     pub logging: bool,
     /// Whether outputs and inputs of equal units are connected if the configuration states no connections.
     pub by_unit: bool,

@@ -32,7 +32,7 @@ pub(crate) struct BusTrace(Arc<Mutex<Writer>>);
 
 struct Writer {
     path: PathBuf,
-    /// `None` until the FMUs are initialised.
+    /// The file; `None` until the FMUs are initialised.
     file: Option<File>,
     /// Bytes to write to the file: at once if the file exists, so that a killed run loses no frame.
     bytes: Vec<u8>,

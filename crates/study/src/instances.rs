@@ -110,8 +110,8 @@ fn stated_interface(element: &Element, config: &Config) -> Option<Interface> {
     })
 }
 
-/// Returns the interface to use: the stated one, otherwise co-simulation if the FMU offers it, otherwise model
-/// exchange. Returns an error if the FMU does not offer the interface that the configuration states.
+/// Returns the interface to use: the stated one if the FMU offers it, otherwise co-simulation if offered, otherwise
+/// model exchange. Returns an error if the FMU does not offer the interface that the configuration states.
 fn choose_interface(
     element: &Element,
     description: &ModelDescription,

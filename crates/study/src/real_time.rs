@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use fmu_description::number::seconds;
 
-/// Longest sleep before the next check whether the wait ends early.
+/// Longest sleep between two checks whether the wait has to end early.
 const SLICE: Duration = Duration::from_millis(50);
 /// Remaining wait below which the clock is read in a loop, because a sleep may end late by about this time.
 const SPIN: Duration = Duration::from_micros(150);
@@ -50,7 +50,7 @@ pub struct Overruns {
     pub count: u64,
     /// Largest overrun in s.
     pub largest: f64,
-    /// Simulated time in s at the end of that step; 0 without overruns.
+    /// Simulated time in s at the end of the step with the largest overrun; 0 without overruns.
     pub at: f64,
 }
 

@@ -49,7 +49,7 @@ struct Recording {
     recent: bool,
     /// Whether a row was recorded between the last two checks of [`write_stalled`] and may not be in the file yet.
     pending: bool,
-    /// The error of a write by [`write_stalled`], which the next call returns.
+    /// The error of a write by [`write_stalled`], which the next call of the recorder returns.
     failed: Option<ResultsError>,
 }
 

@@ -273,7 +273,7 @@ struct Checkpoints {
     path: PathBuf,
     /// Simulated time in s between two checkpoints; `None`: only the checkpoint at the end.
     interval: Option<f64>,
-    /// The complete configuration.
+    /// The complete configuration as text.
     text: String,
     every: Every,
 }

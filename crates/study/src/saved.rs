@@ -13,7 +13,7 @@ use crate::config::{self, Config, Every};
 const MAGIC: &[u8; 16] = b"aso-ftc-state-6\n";
 /// Magic bytes common to all versions of the format.
 const KIND: &[u8] = b"aso-ftc-state-";
-/// Number of bytes of the magic bytes and the checksum.
+/// Length in bytes of magic bytes and checksum.
 const HEADER: usize = MAGIC.len() + 4;
 /// Advice for a checkpoint that cannot be used.
 const ADVICE: &str = "resume another one, or repeat the run from its start with --checkpoint";

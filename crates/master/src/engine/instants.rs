@@ -19,7 +19,7 @@ const MOST: usize = 1000;
 /// The slaves whose events the master handles.
 #[derive(Debug, Default)]
 pub(crate) struct Instants {
-    /// The positions of these slaves in [`System::slaves`], ascending.
+    /// Positions of the slaves whose events the master handles, ascending.
     members: Vec<usize>,
     /// For each slave, the time in s of its next known event; infinite without a known event, and for a slave without
     /// connections.

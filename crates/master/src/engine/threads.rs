@@ -10,7 +10,7 @@ use crate::error::{SystemError, contradiction};
 use crate::exchange::Task;
 use pool::Pool;
 
-/// Number of steps measured with and without threads.
+/// Number of steps of a group whose time is measured without threads, and again in threads.
 const TRIALS: u32 = 16;
 /// Time of a step in threads, relative to the time without threads, below which threads are used.
 const WORTH: f64 = 0.9;
@@ -24,7 +24,7 @@ pub(super) struct Threads {
 /// The measured steps of a group.
 #[derive(Clone, Copy, Default)]
 struct Measured {
-    /// Number of steps.
+    /// Number of measured steps.
     steps: u32,
     /// Total time of the steps without threads.
     sequential: Duration,

@@ -26,7 +26,7 @@ pub(crate) struct Access<T> {
     same: fn(&T, &T) -> bool,
 }
 
-/// Reals.
+/// Access to Reals.
 pub(crate) const REALS: Access<f64> = Access {
     get: |slave, references, values| slave.get_real(references, values),
     set: |slave, references, values| slave.set_real(references, values),
@@ -41,7 +41,7 @@ pub(crate) const REALS: Access<f64> = Access {
     same: |one, other| one.to_bits() == other.to_bits(),
 };
 
-/// Integers and Enumerations.
+/// Access to Integers and Enumerations.
 pub(crate) const INTEGERS: Access<i64> = Access {
     get: |slave, references, values| slave.get_integer(references, values),
     set: |slave, references, values| slave.set_integer(references, values),
@@ -56,7 +56,7 @@ pub(crate) const INTEGERS: Access<i64> = Access {
     same: |one, other| one == other,
 };
 
-/// Booleans.
+/// Access to Booleans.
 pub(crate) const BOOLEANS: Access<i32> = Access {
     get: |slave, references, values| slave.get_boolean(references, values),
     set: |slave, references, values| slave.set_boolean(references, values),
@@ -73,7 +73,7 @@ pub(crate) const BOOLEANS: Access<i32> = Access {
     same: |one, other| (*one != 0) == (*other != 0),
 };
 
-/// Strings.
+/// Access to Strings.
 pub(crate) const STRINGS: Access<String> = Access {
     get: |slave, references, values| slave.get_string(references, values),
     set: |slave, references, values| slave.set_string(references, values),
@@ -83,7 +83,7 @@ pub(crate) const STRINGS: Access<String> = Access {
     same: |one, other| one == other,
 };
 
-/// Binaries.
+/// Access to binaries.
 pub(crate) const BINARIES: Access<Vec<u8>> = Access {
     get: |slave, references, values| slave.get_binary(references, values),
     set: |slave, references, values| slave.set_binary(references, values),

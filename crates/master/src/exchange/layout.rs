@@ -12,9 +12,9 @@ use slave::{CommunicationStep, StepRequest, Transformation, ValueType};
 /// Derivatives that a slave refuses although its model description promises them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Refusal {
-    /// `fmi2SetRealInputDerivatives` fails.
+    /// Whether `fmi2SetRealInputDerivatives` fails.
     pub(crate) inputs: bool,
-    /// `fmi2GetRealOutputDerivatives` fails.
+    /// Whether `fmi2GetRealOutputDerivatives` fails.
     pub(crate) outputs: bool,
 }
 

@@ -65,6 +65,6 @@ pub(crate) struct Task<'a> {
     slave: usize,
     pub(crate) instance: &'a mut dyn Slave,
     pub(crate) request: StepRequest<'a>,
-    /// The result, once the step is made.
+    /// The result of the step, after the step was made.
     pub(crate) done: Result<StepResult, CallError>,
 }

@@ -11,7 +11,7 @@ pub(super) struct Span {
     pub(super) size: f64,
     /// Size in s of the step before the last step.
     pub(super) last_size: f64,
-    /// Size of the step before that in s.
+    /// Size in s of the step two before the last step.
     pub(super) earlier_size: f64,
     /// Whether the slave has made its step, so that the latest values belong to its end.
     pub(super) stepped: bool,
@@ -48,7 +48,7 @@ pub(crate) struct Trace {
     pub(crate) start: Vec<f64>,
     /// Values of all outputs at the start of the step before the last one.
     pub(super) before: Vec<f64>,
-    /// Values of all outputs at the start of the step before that.
+    /// Values of all outputs at the start of the step two before the last one.
     pub(super) earlier: Vec<f64>,
     /// Derivatives of all outputs at the end of the last step.
     pub(super) derivatives: Vec<f64>,

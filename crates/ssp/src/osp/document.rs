@@ -9,7 +9,7 @@ use crate::xml::{Node, finite};
 
 /// Default base step in s.
 const STEP: f64 = 0.1;
-/// Maximum number of inputs and of components of a sum.
+/// Maximum number of inputs, and of components, of a sum.
 const COUNT: usize = 100_000;
 /// The elements that may occur at most once.
 const ONCE: [&str; 7] =

@@ -67,7 +67,7 @@ impl Experiment {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Results {
-    /// The file, `.csv` or `.parquet`.
+    /// The results file, `.csv` or `.parquet`.
     pub file: Option<PathBuf>,
     /// Variables to record, by name or pattern.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -17,7 +17,7 @@ use master::{Port, SystemError};
 
 /// Kinds of a signal.
 const KINDS: &str = "constant, steps, points, ramp, sine, csv";
-/// Largest number of names in a message.
+/// Largest number of names in a message about columns.
 const MOST_NAMES: usize = 10;
 
 /// The settings of one variable: times with values, and the first of the entries with the path of this entry.
