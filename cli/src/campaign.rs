@@ -4,9 +4,9 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// The Python interpreter, unless the variable [`VARIABLE`] names another.
+/// The command of the Python interpreter, unless the environment variable [`VARIABLE`] names another interpreter.
 const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
-/// The environment variable that names the interpreter.
+/// The environment variable with the command of the Python interpreter.
 const VARIABLE: &str = "ASO_FTC_PYTHON";
 
 /// The options of the Python package.

@@ -55,7 +55,7 @@ struct Window {
     largest: f64,
     largest_at: f64,
     at_transition: bool,
-    /// Number of samples.
+    /// Number of samples in the window.
     count: f64,
     /// Number of slides of more than [`SLIDE`] that start and end at rest, and the position of the
     /// last rest.

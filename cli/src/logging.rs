@@ -57,7 +57,7 @@ const LARGEST_KEPT: usize = 1000;
 struct Collection {
     /// The first [`LARGEST_KEPT`] messages.
     messages: Vec<Message>,
-    /// Number of all messages.
+    /// Number of all warnings and errors.
     count: usize,
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context as _, ensure};
 use figure::{Figure, Ink, Panel, Series};
 
-/// Length of the transient after the activation in s.
+/// Length in s of the transient after the start of the compensation.
 const SETTLING: f64 = 20.0;
 /// Length in s of the close-up in Figure 6 that shows single stick-slip transitions.
 const CLOSE_UP: f64 = 6.0;

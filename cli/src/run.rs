@@ -27,7 +27,7 @@ use live::Live;
 pub(crate) use options::{AlgorithmOptions, Options, setting, split_names};
 use progress::Progress;
 
-/// Largest number of connections that are listed.
+/// Largest number of connections that the command lists.
 const LISTED: usize = 20;
 
 /// Couples FMUs and writes the results. Exit status: 0 if the run reached its stop time, or an FMU or the live view
@@ -65,7 +65,7 @@ pub(crate) fn run(options: &Options) -> u8 {
 /// A started run, with the data needed at its end.
 struct ActiveRun {
     run: Run,
-    /// The current folder at the start.
+    /// The current folder at the start of the run.
     folder: PathBuf,
     /// Units by variable, for the plot.
     units: Vec<(String, String)>,
@@ -75,7 +75,7 @@ struct ActiveRun {
     planned: PlannedEntries,
     /// The trace of the buses that the report can show.
     bus_trace: Option<PathBuf>,
-    /// The pacing by the clock, if one is requested.
+    /// The pacing of the run by the wall clock, if requested.
     pace: Option<RealTime>,
     /// The live view, if one is requested.
     live: Option<Live>,

@@ -78,7 +78,7 @@ struct Numbers {
     residual: f64,
     delta: f64,
     note: &'static str,
-    /// The rank, and the rank that is necessary.
+    /// The rank of the controllability matrix, and the rank that theorem 1 requires.
     controllability_rank: [usize; 2],
     observability_rank: [usize; 2],
 }

@@ -96,7 +96,7 @@ fn calls(ended: &Ended) -> String {
     calls.join(", or ")
 }
 
-/// SIGKILL, SIGTERM, SIGINT.
+/// SIGKILL, SIGTERM and SIGINT, which usually come from outside of the FMU.
 const FROM_OUTSIDE: [i32; 3] = [9, 15, 2];
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ const FMU: &str = "fmu";
 /// Largest number of messages that wait at the same time; further messages are only counted.
 const WAITING: usize = 10_000;
 
-/// The messages that wait.
+/// Messages that wait for a thread that can pass them on to Python.
 static MESSAGES: Mutex<Vec<Message>> = Mutex::new(Vec::new());
 /// Number of messages that were dropped.
 static LOST: AtomicU64 = AtomicU64::new(0);
@@ -39,7 +39,7 @@ struct Message {
 }
 
 thread_local! {
-    /// Whether the messages of this thread are dropped.
+    /// Whether messages of this thread are dropped.
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 

@@ -10,7 +10,7 @@ use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use toml::Spanned;
 
-/// Largest depth of nested values.
+/// Largest depth of nested values that are converted.
 const DEPTH: usize = 32;
 
 /// A value of TOML.

@@ -30,7 +30,7 @@ pub(crate) struct PythonSlave {
     raised: Raised,
     /// For each slot, the saved values and the saved state of the Python object.
     saved: Vec<Option<(Vec<f64>, Py<PyAny>)>>,
-    /// Whether the object is to be stopped: after `start`, until `stop`.
+    /// Whether the object still has to be stopped: true from `start` until `stop`.
     is_started: bool,
 }
 

@@ -17,7 +17,7 @@ const INTERVAL: Duration = Duration::from_millis(20);
 /// read after each step.
 const STRIDE: u32 = 8;
 const SHORT: Duration = Duration::from_millis(1);
-/// Number of parts of the progress bar.
+/// Number of updates of the progress bar during a run.
 const PARTS: u64 = 400;
 
 /// A request to end a run, which any thread may make.

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::finding::{Finding, Tool};
 
-/// Largest number of names shown of each type.
+/// Largest number of names of variables of each type in the summary.
 const SHOWN: usize = 8;
 
 /// Result of a trial run in this master.
@@ -59,7 +59,7 @@ pub(super) struct ToolRefusal {
     tool: Tool,
     /// The first finding for which the tool refuses the FMU.
     reason: String,
-    /// Number of further such findings.
+    /// Number of further findings for which the tool refuses the FMU.
     more: usize,
 }
 

@@ -14,9 +14,9 @@ use super::finding::{Finding, Findings, Part, Tool};
 use super::messages::MessageRecorder;
 use super::values::{Value, distance, get, outputs, start, start_variables, unknown_reference};
 
-/// Number of steps of a trial.
+/// Number of communication steps of a trial, unless the check is thorough.
 const STEPS: u32 = 10;
-/// Largest number of outputs, of inputs and of start values that are read.
+/// Largest number of outputs, of inputs and of start values that a trial uses.
 const VARIABLES: usize = 1000;
 /// Largest relative difference of the outputs after a state is restored that is only a warning: a solver that restarts
 /// causes such differences.

@@ -77,7 +77,7 @@ pub(crate) struct Finding {
     pub(crate) why: Option<String>,
     /// Section of the standard: of FMI 2.0.5 until [`super::sections::renumber`] converts it to the version of the FMU.
     pub(crate) section: Option<&'static str>,
-    /// The tools that the finding stops.
+    /// The tools that refuse the FMU because of the finding.
     pub(crate) stops: Vec<Tool>,
 }
 

@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 
 use crate::logging;
 
-/// Number of parts of the bar.
+/// Number of parts of the progress bar.
 const PARTS: f64 = 1000.0;
 /// Interval at which the progress bar is redrawn, to update the elapsed time.
 const REDRAW: Duration = Duration::from_millis(200);

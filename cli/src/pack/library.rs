@@ -14,7 +14,7 @@ use cargo_metadata::{
     TargetKind,
 };
 
-/// The profile `fmu`, for workspaces without a profile of this name.
+/// The cargo profile `fmu`, for workspaces without a profile of this name.
 const PROFILE: &str = include_str!("fmu-profile.toml");
 
 /// The library of a crate, with the list of the packages that it contains.

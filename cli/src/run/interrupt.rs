@@ -11,15 +11,15 @@ use fmu_import::crash;
 
 use crate::signals::on_signal;
 
-/// Time limits of a call of an FMU, and of the current step, after the signal.
+/// Time limits, after the signal, for a call of an FMU and for the current step.
 const CALL: Duration = Duration::from_millis(800);
 const STEP: Duration = Duration::from_secs(5);
-/// Interval of checks whether calls return.
+/// Interval between two checks whether calls of FMUs return.
 const LOOK: Duration = Duration::from_millis(50);
 /// A second signal within this time counts as the first one, sent both to the process and to its group.
 const TOGETHER: Duration = Duration::from_millis(200);
 
-/// Whether signals are handled.
+/// Whether the handler of the signals is installed.
 static LISTENING: AtomicBool = AtomicBool::new(false);
 /// The number of the first signal that has arrived; 0: none.
 static RAISED: AtomicU8 = AtomicU8::new(0);
@@ -48,7 +48,7 @@ pub(super) fn listen() -> anyhow::Result<()> {
 /// Handles a signal: the first one makes [`wait`] watch the end of the run, a later one after [`TOGETHER`] ends the
 /// process.
 fn raise(signal: u8) {
-    /// When the first signal arrived.
+    /// Time at which the first signal arrived.
     static FIRST: OnceLock<Instant> = OnceLock::new();
     if RAISED.compare_exchange(0, signal, Ordering::Relaxed, Ordering::Relaxed).is_err() {
         if FIRST.get_or_init(Instant::now).elapsed() > TOGETHER {

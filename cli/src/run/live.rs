@@ -40,13 +40,13 @@ pub(crate) enum LiveStart {
 pub(super) struct Live {
     view: View,
     probe: Probe,
-    /// Whether the signals can be read; false after the first error.
+    /// Whether the signals of the page can be read; false after the first error.
     readable: bool,
     phase: Phase,
     /// Whether the run pauses again after its next step.
     pauses_again: bool,
     start: Instant,
-    /// Time of all pauses and requests.
+    /// Total duration of pauses and requests, left out of the wall-clock time of the run.
     paused: Duration,
     /// Comment lines of the file that repeats the run: its purpose, the interventions, and the stop.
     remarks: Vec<String>,

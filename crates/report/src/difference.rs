@@ -14,7 +14,7 @@ use crate::{Error, View};
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Difference {
-    /// The variable.
+    /// Name of the variable.
     pub name: String,
     /// The largest absolute difference; infinite if a value differs from NaN or infinity.
     pub largest: f64,
@@ -216,7 +216,7 @@ struct Series {
     next: Option<Row>,
     /// The times of the first and of the last call of [`Series::advance_to`].
     requested: Option<(f64, f64)>,
-    /// Number of rows before the time of the first call.
+    /// Number of rows before the first requested time.
     early: u64,
 }
 

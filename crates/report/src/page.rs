@@ -57,7 +57,7 @@ struct Data<'a> {
     marks: &'a [Mark],
     /// The times of events.
     events: &'a [f64],
-    /// The result of [`command`].
+    /// The command for a page of the same files, from [`command`].
     command: String,
 }
 

@@ -111,13 +111,13 @@ struct Grid {
     /// Column of the times in s.
     time: usize,
     rows: usize,
-    /// The number of all rows; the plots may have fewer.
+    /// Number of all rows of the run; the plots may have fewer.
     total: usize,
 }
 
 #[derive(Serialize)]
 struct Plot {
-    /// The FMU of the variables; empty if there is none.
+    /// The FMU of the variables; empty for variables of no FMU.
     fmu: String,
     unit: String,
     /// Whether the plot is not folded.
@@ -132,7 +132,7 @@ struct Curve {
     name: String,
     /// Whether the value is held between two rows.
     holds: bool,
-    /// Whether the points are not connected.
+    /// Whether the points are shown as dots, without lines between them.
     dots: bool,
     values: usize,
     /// The values of the other run at the same times, if the other run has the variable.

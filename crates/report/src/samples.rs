@@ -18,9 +18,9 @@ pub(crate) struct Samples {
 pub(crate) struct Collector {
     /// The rows that are kept.
     samples: Samples,
-    /// The rows of the present block.
+    /// The rows of the present block, from which extremes are chosen.
     block: Samples,
-    /// Number of rows of a block; 1: all rows are kept.
+    /// Number of rows of a block; with 1, all rows are kept.
     length: usize,
     /// Whether the columns are pairs: column k of the first half and column k of the second half.
     is_paired: bool,

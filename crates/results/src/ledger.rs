@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::identity::Identity;
 
-/// Number of words that [`share`] needs at least.
+/// Least number of words of the memory that [`share`] needs.
 pub const WORDS: usize = ROWS + (1 << 16);
 
 // Positions in the shared memory, in words: the numbers, then the bytes of the path, then the bytes of the rows.

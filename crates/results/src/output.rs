@@ -36,7 +36,7 @@ pub(super) struct OutputFile {
     absolute: PathBuf,
     file: File,
     identity: Identity,
-    /// Whether this is a regular file, with a length and a position.
+    /// Whether the output is a regular file, with a length and a position.
     regular: bool,
     /// The process that has created the file.
     process: u32,

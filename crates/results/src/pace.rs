@@ -14,7 +14,7 @@ pub(super) struct Pace {
     last_reading: Instant,
     /// Number of rows until the next reading of the clock.
     left: u32,
-    /// Number of rows between two readings.
+    /// Present number of rows between two readings of the clock.
     stride: u32,
 }
 

@@ -18,7 +18,7 @@ const PADDING: usize = 8;
 pub(super) struct Block {
     /// Number of rows.
     pub(super) rows: usize,
-    /// Capacity in rows.
+    /// Number of rows for which the block has room.
     pub(super) room: usize,
     pub(super) reals: Vec<f64>,
     pub(super) integers: Vec<i32>,

@@ -29,7 +29,7 @@ const VERSION: i32 = 1;
 pub(super) struct Footer {
     pub(super) schema: SchemaDescPtr,
     metadata: Vec<KeyValue>,
-    /// The row groups of all later footers.
+    /// The row groups that all later footers contain.
     pub(super) groups: Vec<RowGroupMetaData>,
 }
 
