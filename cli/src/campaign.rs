@@ -110,7 +110,7 @@ fn run_in_place(mut command: Command) -> std::io::Result<u8> {
     Err(std::os::unix::process::CommandExt::exec(&mut command))
 }
 
-/// Runs the program to its end and returns its exit status; 1 if it has none from 0 to 255.
+/// Runs the program to its end and returns its exit status; 1 for a program without a status from 0 to 255.
 #[cfg(not(unix))]
 fn run_in_place(mut command: Command) -> std::io::Result<u8> {
     let code = command.status()?.code().and_then(|code| u8::try_from(code).ok());

@@ -11,7 +11,7 @@ pub(crate) const FMUS: [(&str, &str); 2] =
 /// The FMU from which Kalman filters are made, of the crate `fmu-kalman`.
 pub(crate) const FILTER: &str = "KalmanFilter.fmu";
 
-/// The folder into which FMUs are packed if no other is stated.
+/// The folder into which FMUs are packed by default.
 const DIST: &str = "dist";
 
 /// Folders, relative to the folder of the command, in which FMUs are searched: in a release, below the prefix of an

@@ -71,7 +71,7 @@ impl Drop for Outputs {
     }
 }
 
-/// A file with new content, and the temporary name of the former file, if there was one.
+/// A file with new content, and the temporary name of the former file, if a former file existed.
 struct Replacement {
     path: PathBuf,
     former: Option<PathBuf>,

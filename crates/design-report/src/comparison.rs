@@ -29,7 +29,7 @@ pub struct LawResult {
     pub law: String,
     /// Authors of the law.
     pub sources: String,
-    /// Why the law does not exist, in a sentence; none if it exists.
+    /// Reason, in a sentence, why the law does not exist; none for an existing law.
     pub reason: Option<String>,
     /// Results of the law on this plant; none if the law does not exist.
     pub result: Option<LawFigures>,

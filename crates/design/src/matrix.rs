@@ -13,7 +13,7 @@ pub(crate) fn pairs(numbers: &[Complex<f64>]) -> Vec<[f64; 2]> {
     numbers.iter().map(|number| [number.re, number.im]).collect()
 }
 
-/// Returns the matrix as the design file has it; negative zeros become zeros.
+/// Converts a matrix to the form of the design file; negative zeros become zeros.
 pub(crate) fn matrix(dense: &DMatrix<f64>) -> Matrix {
     let values =
         dense.row_iter().flat_map(|row| row.iter().map(|entry| entry + 0.0).collect::<Vec<_>>());

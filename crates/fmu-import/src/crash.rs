@@ -243,7 +243,7 @@ fn cause() -> Cause {
 }
 
 /// Wakes the thread of [`watch`] to report the end. Does nothing if the end has started already or [`watch`] was not
-/// called. Signal handlers call this function: it neither allocates nor locks.
+/// called. Signal handlers call this function: therefore it neither allocates nor locks.
 fn start_report(cause: i32, place: usize) {
     if let Some(reporter) = REPORTER.get()
         && !ENDING.swap(true, Ordering::AcqRel)

@@ -101,7 +101,8 @@ impl IntermediateUpdate {
         Self { environment: std::ptr::null_mut(), function: nothing }
     }
 
-    /// Asks the importer to set the inputs of `time` in s; it can neither read outputs nor end the step early.
+    /// Asks the importer to set the inputs of `time` in s; the importer can neither read outputs nor end the step
+    /// early.
     pub(crate) fn ask(self, time: f64) {
         let (mut return_requested, mut return_time) = (0, time);
         let (request, result) = (&raw mut return_requested, &raw mut return_time);

@@ -58,7 +58,7 @@ pub(crate) struct Core<M: Model> {
 /// Lays the variables out for values of the structural parameters.
 type LayOut<M> = fn(&mut Instance<M>, Vec<u64>) -> Result<(), Failure>;
 
-/// An instance: the FMU state and the data that is not part of it.
+/// An instance: the FMU state and the data that is not part of the state.
 pub(crate) struct Instance<M: Model> {
     core: Core<M>,
     fresh: M,

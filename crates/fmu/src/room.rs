@@ -1,4 +1,4 @@
-//! The importer's memory for output values, which it need not have initialised.
+//! The importer's memory for output values, which the importer need not have initialised.
 #![expect(unsafe_code, reason = "memory of C")]
 
 use std::mem::MaybeUninit;

@@ -298,9 +298,9 @@ impl<M> Variable<M> {
         calculated_parameter() causality = Causality::CalculatedParameter, variability = Variability::Fixed;
         /// Makes a local variable or output constant.
         constant() variability = Variability::Constant, initial = Some(Initial::Exact);
-        /// Makes a Real discrete: it changes at events or communication points only.
+        /// Makes a Real discrete: the value changes at events or communication points only.
         discrete() variability = Variability::Discrete;
-        /// Sets `initial = exact` for a local variable or output: it starts with the value of its field after
+        /// Sets `initial = exact` for a local variable or output: the variable starts with the value of its field after
         /// [`Model::new`](crate::Model::new), unless the importer sets another value before the first step.
         exact() initial = Some(Initial::Exact);
         /// Sets `initial = approx` for a local variable or output: an iteration computes the initial value

@@ -257,7 +257,7 @@ impl Drives {
         self.write_to(system, time, |_| true)
     }
 
-    /// Makes driven clocks of `slave` tick, in event mode: those whose signal starts with a value other than 0, or has
+    /// Makes driven clocks of `slave` tick, in event mode: clocks whose signal starts with a value other than 0, or has
     /// jumped to such a value between the last commit and `time`, in s.
     pub(crate) fn tick(
         &mut self,

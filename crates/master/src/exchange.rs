@@ -68,8 +68,8 @@ impl Values {
 }
 
 impl Exchange {
-    /// Lays out the connections of `system`. `refusing` lists for each slave the derivatives that
-    /// it refuses; empty: none.
+    /// Lays out the connections of `system`. `refusing` lists for each slave the derivatives that this slave refuses;
+    /// empty if no slave refuses any.
     pub(crate) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
         let reals = Reals::new(system, algorithm, refusing);
         let to_reals: Vec<Port> =

@@ -138,7 +138,7 @@ pub enum FaultError {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FaultChain {
     stages: Vec<Stage>,
-    /// The smallest and the largest value of the input, if it is an Integer input of a system.
+    /// The smallest and the largest value of the input, for an Integer input of a system.
     range: Option<(i64, i64)>,
 }
 

@@ -12,7 +12,7 @@ use crate::system::{Connection, Port, System};
 pub enum SignalType {
     /// A floating-point number that varies with time.
     Continuous,
-    /// Piecewise constant: it changes at events or communication points only.
+    /// Piecewise constant: the value changes at events or communication points only.
     Discrete,
     /// Present at the ticks of a clock only (FMI 3.0.2, section 2.2.8), or a clock itself.
     Clocked,

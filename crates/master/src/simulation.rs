@@ -256,8 +256,8 @@ impl Simulation {
         }
     }
 
-    /// Ends the run because a slave requested it in the step from `start`. The time of the run becomes
-    /// the time of the request if all slaves are there, otherwise `start`.
+    /// Ends the run because a slave requested it in the step from `start`. The time of the run becomes the time of the
+    /// request if all slaves have reached it, otherwise `start`.
     #[cold]
     fn end_early(&mut self, start: f64, ending: Ending) {
         self.ended = Some(ending);

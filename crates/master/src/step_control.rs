@@ -127,8 +127,8 @@ impl SizeControl {
         })
     }
 
-    /// Plans the next step. If all slaves take steps of any size, it ends where a signal or a fault starts, ends or has
-    /// a kink, and at known events.
+    /// Plans the next step. If all slaves take steps of any size, the step ends where a signal or a fault starts, ends
+    /// or has a kink, and at known events.
     #[inline]
     pub(crate) fn plan(&self, engine: &mut Engine) -> PlannedStep {
         if self.kind == StepControl::Fixed {

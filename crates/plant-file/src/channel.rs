@@ -40,8 +40,7 @@ pub(crate) struct ChannelSignals<'a> {
 }
 
 impl ChannelWeight {
-    /// The factor of a constant weight; 1 for a weight over frequency, which is a system with states, added to the
-    /// plant.
+    /// The factor of a constant weight; 1 for a weight over frequency, which becomes states of the plant.
     #[must_use]
     pub fn factor(&self) -> f64 {
         self.weight.as_constant().unwrap_or(1.0)

@@ -142,7 +142,7 @@ impl Law {
 }
 
 impl EstimationRequest {
-    /// Reads the table; without it the law is the augmented observer. `faults`: the number of faults.
+    /// Reads the table; without a table the law is the augmented observer. `faults`: the number of faults.
     pub(crate) fn read(file: &Table<'_>, faults: usize) -> Result<Self> {
         let Some(entry) = file.get("estimation") else {
             return Ok(Self { law: Law::Augmented, place: file.place.clone() });

@@ -246,7 +246,7 @@ fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>> {
     Ok(all)
 }
 
-/// Reads a region; in a sampled design it has a decay rate only.
+/// Reads a region; in a sampled design a region has a decay rate only.
 pub(crate) fn stated_region(entry: &Entry<'_>, sampled: bool) -> Result<Region> {
     if sampled {
         refuse_disc_and_sector(entry)?;

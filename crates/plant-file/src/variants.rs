@@ -1,5 +1,4 @@
-//! Reads the plants besides the one of the file: the members of a family, and the points of a
-//! schedule.
+//! Reads the plants besides the plant of the file: the members of a family, and the points of a schedule.
 
 use files::{Entry, Place, Table};
 

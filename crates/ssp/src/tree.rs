@@ -72,7 +72,7 @@ pub(super) enum Content {
     Reference(usize),
 }
 
-/// The data of a file that its elements and other files need.
+/// The data of a file that the elements of the file and other files need.
 #[derive(Debug, Default)]
 pub(super) struct File {
     /// Name of the file for messages.

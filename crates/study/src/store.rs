@@ -124,7 +124,7 @@ impl fmt::Debug for Store {
     }
 }
 
-/// Locks `mutex`, even if another thread has panicked during its lock of it.
+/// Locks `mutex`, even if another thread panicked with the lock held.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -10,7 +10,7 @@ use crate::report::{Certificate, FreeP, Norm, Theorem1, Ultimate};
 use crate::solve::solution::Solution;
 use plant_file::estimation::Law;
 
-/// The design parameter alpha of (12) of Patton and Klinkhieo (2009); it cancels in delta.
+/// The design parameter alpha of (12) of Patton and Klinkhieo (2009); alpha cancels in delta.
 const ALPHA: f64 = 1.0;
 
 /// Largest number of observer states for which linear matrix inequalities are solved: their cost grows

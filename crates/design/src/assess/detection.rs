@@ -198,7 +198,7 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Returns for each fault whether the test for the fault `tested` reacts to it.
+/// Returns for each fault whether the test for the fault `tested` reacts to this fault.
 fn reacting(
     decoupling: &Decoupling<'_>,
     test: &PlannedTest,
@@ -223,7 +223,7 @@ fn largest(means: &DMatrix<f64>) -> f64 {
     means.column_iter().map(|column| column.norm()).fold(0.0, f64::max)
 }
 
-/// Returns all tests, each with the filter that it belongs to.
+/// Returns all tests, each with the residual filter that feeds it.
 fn tests<'a>(parts: &'a [Part<'a>]) -> impl Iterator<Item = (&'a Decoupling<'a>, &'a PlannedTest)> {
     parts.iter().flat_map(|part| part.tests.iter().map(|test| (&part.decoupling, test)))
 }

@@ -18,7 +18,7 @@ use crate::solve::family::{NOMINAL, name};
 use crate::solve::solution::Solution;
 use plant_file::robustness::RobustnessLimits;
 
-/// Returns the report on the family of `designed`; None if it has none.
+/// Returns the report on the family of `designed`; None without a family.
 pub(crate) fn family(
     designed: &Designed,
     limits: &RobustnessLimits,

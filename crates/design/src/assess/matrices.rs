@@ -43,8 +43,8 @@ impl Names {
         }
     }
 
-    /// Returns A, B, C, F_a of the plant, and D with direct feedthrough; the model in the observer if it differs, and
-    /// A_f if it is not 0.
+    /// Returns A, B, C, F_a of the plant, and D with direct feedthrough; the model in the observer if this model
+    /// differs, and A_f if not 0.
     pub(crate) fn plant_matrices(&self, designed: &Solution) -> Vec<Matrix> {
         let Self { states, extended, actuators, measurements, faults, .. } = self;
         let linear = &designed.linear;

@@ -64,7 +64,7 @@ struct ReferenceLoop<'a> {
     tracking: &'a Tracking,
     /// The measurements, then the combinations of measurements that references set.
     outputs: Vec<Signal>,
-    /// For each reference, the position of the output that follows it.
+    /// For each reference, the position of the output that follows the reference.
     tracked: Vec<usize>,
     /// Outputs, commands, and for a sampled loop the outputs at each time between samples.
     system: StateSpace,

@@ -241,7 +241,7 @@ fn plant(designed: &Solution, names: &Names) -> Result<Plant, Error> {
     })
 }
 
-/// Describes how a fault enters and what is known about it.
+/// Describes where a fault enters, and its stated bounds and dynamics.
 fn notes(fault: &Fault, designed: &Solution) -> String {
     let linear = &designed.linear;
     let mut parts = vec![match &fault.entry_point {

@@ -22,7 +22,7 @@ const CHECKED: u32 = 20;
 /// Distance from the stability limit within which an eigenvalue counts as on the limit, because of rounding errors.
 const NEUTRAL: f64 = 1e-7;
 
-/// Returns the report on the schedule of `designed`; None if it has none.
+/// Returns the report on the schedule of `designed`; None without a schedule.
 pub(crate) fn schedule(
     designed: &Designed,
     limits: &RobustnessLimits,

@@ -70,7 +70,7 @@ fn without_samples(table: &mut Table, file: &PlantFile<'_>, f_a: Option<&DMatrix
     }
 }
 
-/// Replaces the entries that refer to the plant's FMU; false if a fault or a disturbance cannot be stated without it.
+/// Replaces the entries that refer to the plant's FMU; false if a fault or a disturbance needs the FMU.
 fn without_fmu(table: &mut Table, designed: &Solution) -> bool {
     // Members and points of a schedule are linearised from the FMU.
     for key in ["plant", "operating_point", "preload", "linearisation_step", "family", "schedule"] {

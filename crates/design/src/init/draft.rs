@@ -65,7 +65,7 @@ pub(super) struct Bandwidths {
 }
 
 impl Draft {
-    /// Returns the plant file. `refusal`: the lines that say why there is no controller for it; empty if there is one.
+    /// Returns the plant file. `refusal`: the lines that say why no controller was found; empty if one was found.
     pub(super) fn text(&self, settings: &Settings, refusal: &[&str]) -> String {
         let mut text = format!(
             "# Plant: {}. Each entry is described in the reference of plant files.\n\n",

@@ -22,10 +22,10 @@ pub(super) use read::is_log;
 /// How a plant is identified from a log.
 #[derive(Debug, Clone, Default)]
 pub struct LogOptions {
-    /// The columns that are commands; empty for those called `u`, `u1` and so on.
+    /// The columns that are commands; empty for the columns called `u`, `u1` and so on.
     pub inputs: Vec<String>,
     /// The columns that are measurements; empty for all columns besides stated inputs or, without stated inputs, for
-    /// those called `y`, `y1` and so on.
+    /// the columns called `y`, `y1` and so on.
     pub outputs: Vec<String>,
     /// The number of states; None for the smallest one that predicts the last quarter of the logs nearly as well as
     /// the best one.

@@ -71,7 +71,7 @@ pub(crate) fn states(pid: &Pid, measurements: &[Signal]) -> Vec<Signal> {
     all
 }
 
-/// Adds to a plant the filters of its measurements, whose states follow those of the plant.
+/// Adds to a plant the filters of its measurements, whose states follow the states of the plant.
 pub(crate) fn with_filters(pid: &Pid, plant: &StateSpace) -> Result<StateSpace, Error> {
     let StateSpace { a, b, c, d, .. } = plant;
     let n = a.nrows();

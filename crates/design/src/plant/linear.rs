@@ -331,7 +331,7 @@ pub(crate) fn open(file: &PlantFile<'_>, fmu: &plant_file::PlantFmu) -> Result<F
 }
 
 /// Returns the request for the linear plant at the operating point of the file; its faults are the inputs of faults,
-/// then those of disturbances.
+/// then the inputs of disturbances.
 pub(crate) fn request(file: &PlantFile<'_>, fmu: &plant_file::PlantFmu) -> Linearise {
     let names = |signals: &[Signal]| signals.iter().map(|signal| signal.name.clone()).collect();
     let inputs = file.faults.iter().filter_map(|fault| match &fault.entry_point {

@@ -94,8 +94,8 @@ impl<'a> ParameterFamily<'a> {
         Ok((plant, DVector::from_vec(linearised.rates), measured))
     }
 
-    /// Returns the parameters for the report; `deviations`: those of the worst plant; `peaks`: derivatives of
-    /// the peaks of S at the commands and at the measurements with respect to the entries.
+    /// Returns the parameters for the report; `deviations`: the parameter deviations of the worst plant; `peaks`:
+    /// derivatives of the peaks of S at the commands and at the measurements with respect to the entries.
     pub(crate) fn report(&self, deviations: &[f64], peaks: &[[DMatrix<f64>; 4]]) -> Vec<Parameter> {
         let effects: Vec<Vec<f64>> = peaks.iter().map(|entries| self.slopes(entries)).collect();
         let one = |(at, parameter): (usize, &FmuParameter)| Parameter {

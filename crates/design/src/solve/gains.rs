@@ -133,7 +133,7 @@ pub(crate) fn observer(
 
 /// Required eigenvalues in the plane of the domain.
 struct Assignment {
-    /// The eigenvalues of the movable part, then those of fixed modes.
+    /// The eigenvalues of the movable part, then the eigenvalues of fixed modes.
     required: Vec<Complex<f64>>,
     /// The eigenvalues of the movable part.
     movable: Vec<Complex<f64>>,

@@ -192,8 +192,8 @@ impl LawProblem<'_> {
         Ok(sampled)
     }
 
-    /// Returns rho of each fault, stated or by default, and adds to `conditions` that it is above the bound of the
-    /// fault; the error says in a sentence where it is not, or what is missing.
+    /// Returns rho of each fault, stated or by default, and adds to `conditions` that rho is above the bound of the
+    /// fault; the error says in a sentence for which fault it is not, or what is missing.
     fn reach(
         &self,
         stated: Option<&Vec<f64>>,

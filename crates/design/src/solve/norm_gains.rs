@@ -302,8 +302,8 @@ impl FeedbackProblem<'_> {
         Ok(Some(ChannelWeights { input, output }))
     }
 
-    /// Computes a lower bound of the norm for all state feedbacks, also for those that know the states of the weights;
-    /// None if none is known, and above [`LARGEST_ORDER`] states.
+    /// Computes a lower bound of the norm for all state feedbacks, also for state feedbacks that know the states of the
+    /// weights; None if no bound is known, and above [`LARGEST_ORDER`] states.
     fn lower_bound(
         &self,
         performance: &Performance,

@@ -196,8 +196,8 @@ impl Without<'_> {
         Ok(Ok((ReconfiguredGains { k_x, k_f, k_s }, report)))
     }
 
-    /// Returns the gains of the feedback whose loop has the lowest peaks of S, with the equilibrium. The observer is
-    /// the one for the intact plant.
+    /// Returns the gains of the feedback whose loop has the lowest peaks of S, with the equilibrium. The observer of
+    /// the intact plant stays.
     fn chosen(
         &self,
         feedbacks: &Feedbacks,

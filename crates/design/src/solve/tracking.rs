@@ -21,7 +21,7 @@ use plant_file::requirements::Requirement;
 use plant_file::signals::{Signal, is_one_unit, signal_names};
 use plant_file::variants::Variant;
 
-/// Relative error of a constant reference below which it counts as reached.
+/// Relative error at rest below which a constant reference counts as reached.
 pub(crate) const REACHED: f64 = 1e-9;
 
 /// The references of a design.
@@ -313,8 +313,8 @@ impl LoopModel<'_> {
         Ok(DesignLoop { plant: faulty, controller: whole.commands })
     }
 
-    /// Returns the controller with `gains`, its filter and its integrals. With direct feedthrough it subtracts D u from
-    /// the measurements.
+    /// Returns the controller with `gains`, its filter and its integrals. With direct feedthrough the controller
+    /// subtracts D u from the measurements.
     pub(crate) fn complete(self, gains: &Gains) -> Result<CompleteController, Error> {
         let controller = complete_controller(self.plant, gains, self.filter, self.domain)?;
         if !self.linear.has_feedthrough() {

@@ -61,7 +61,7 @@ fn is_source(path: &String) -> bool {
 }
 
 /// Reads how the libraries of the FMU in `folder` are built: first the configurations for one of `platforms`, then
-/// those without a platform, then others. On failure returns what is missing or wrong.
+/// configurations without a platform, then others. On failure returns the missing or wrong entry.
 pub(super) fn read(folder: &Path, platforms: &[&str]) -> Result<Vec<BuildConfiguration>, String> {
     let file = folder.join("sources/buildDescription.xml");
     let mut configurations = if file.is_file() {

@@ -39,11 +39,11 @@ macro_rules! fields {
 }
 
 fields! {
-    /// The turn counter: odd when it is the worker's turn, even when it is the master's.
+    /// The turn counter: odd during the worker's turn, even during the master's turn.
     turn = 0;
-    /// Not 0 while the master sleeps until it is woken.
+    /// Not 0 while the master sleeps and must be woken.
     master_sleeps = SPACING;
-    /// Not 0 while the worker sleeps until it is woken.
+    /// Not 0 while the worker sleeps and must be woken.
     worker_sleeps = 2 * SPACING;
     /// The command for the worker.
     command = 3 * SPACING;
@@ -67,7 +67,7 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    /// Creates memory for an FMU with `variables` variables; returns it and the file behind it.
+    /// Creates memory for an FMU with `variables` variables; returns the memory and its file, for the worker.
     pub(super) fn create(variables: usize) -> io::Result<(Self, File)> {
         let area = WORDS_PER_VARIABLE.saturating_mul(variables).saturating_add(MIN_AREA);
         let (region, file) = Region::create(area.saturating_add(AREA + RING))?;

@@ -16,7 +16,7 @@ pub(super) struct Output {
 }
 
 impl Output {
-    /// Starts the thread; returns it and the write end, which becomes the worker's standard error.
+    /// Starts the thread; returns the thread and the write end of the pipe, which becomes the worker's standard error.
     pub(super) fn new(instance: &str) -> io::Result<(Self, PipeWriter)> {
         let (reader, writer) = io::pipe()?;
         let (sender, ended) = channel();

@@ -17,7 +17,7 @@ pub(super) struct Region {
 }
 
 impl Region {
-    /// Creates memory of `words` zeros; returns it and the file through which another process maps it.
+    /// Creates memory of `words` zeros; returns the memory and the file through which another process maps this memory.
     pub(super) fn create(words: usize) -> io::Result<(Self, File)> {
         let flags = MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING;
         let file = File::from(memfd_create("fmu", flags)?);

@@ -16,8 +16,7 @@ pub(super) fn text(pointer: *const c_char) -> Option<String> {
     bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// Lets the kernel copy the bytes, page by page: it reports an unreadable page instead of raising
-/// SIGSEGV.
+/// Lets the kernel copy the bytes, page by page: the kernel reports an unreadable page instead of raising SIGSEGV.
 #[cfg(target_os = "linux")]
 fn read(pointer: *const u8) -> Option<Vec<u8>> {
     const PAGE: usize = 4096;

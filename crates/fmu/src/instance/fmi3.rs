@@ -1,4 +1,4 @@
-//! The functions of FMI 3.0 that differ from those of FMI 2.0.
+//! The functions of FMI 3.0 that differ from the functions of FMI 2.0.
 
 mod clocks;
 mod configuration;

@@ -1,5 +1,5 @@
-//! The variables of FMI 3.0, derived from those of FMI 2.0: value references that are unique over all
-//! types, arrays, and event indicators as variables.
+//! The variables of FMI 3.0, derived from the variables of FMI 2.0: value references that are unique over all types,
+//! arrays, and event indicators as variables.
 
 mod arrays;
 mod describe;

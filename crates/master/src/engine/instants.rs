@@ -307,7 +307,7 @@ impl Instants {
     }
 }
 
-/// Performs `action` with the events of a slave; an error names it and `time`, in s.
+/// Performs `action` with the events of a slave; an error names the slave and `time`, in s.
 fn with_events<T>(
     system: &mut System,
     slave: usize,

@@ -76,7 +76,7 @@ impl Reals {
         }
     }
 
-    /// Returns the index of an output in [`Reals::outputs`], if it is connected.
+    /// Returns the index of an output in [`Reals::outputs`], if the output is connected.
     pub(crate) fn output(&self, port: Port) -> Option<usize> {
         self.layout.output(port)
     }

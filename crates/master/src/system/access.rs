@@ -44,7 +44,7 @@ impl System {
         Ok(())
     }
 
-    /// Performs `action` with a slave; an error names it and `time`, in s.
+    /// Performs `action` with a slave; an error names the slave and `time`, in s.
     pub(crate) fn perform<T>(
         &mut self,
         slave: usize,

@@ -132,7 +132,8 @@ impl Columns<'_> {
         Signal { unit: column.unit.clone().or(name.unit), ..name }
     }
 
-    /// Returns the length in s of the unit of the times, 1 if none is stated; an error if it is no unit of time.
+    /// Returns the length in s of the unit of the times, 1 without a stated unit; an error for a unit of another
+    /// quantity.
     fn seconds(&self) -> Result<f64, String> {
         let Some(text) = self.name(self.0.time()).unit else { return Ok(1.0) };
         let refusal = || format!("the time is in {text}, expected s, ms, min, h or d");
@@ -217,7 +218,7 @@ impl Columns<'_> {
     }
 }
 
-/// Returns the length in s of a unit, 1 for other names of the second and for `-`; None if it is no unit of time.
+/// Returns the length in s of a unit, 1 for other names of the second and for `-`; None for a unit of another quantity.
 fn seconds(unit: &str) -> Option<f64> {
     if ["sec", "secs", "second", "seconds", "-"].contains(&unit.to_lowercase().as_str()) {
         return Some(1.0);

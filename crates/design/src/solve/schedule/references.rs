@@ -38,7 +38,7 @@ pub(crate) fn examine(
 
 type DesignAt<'a> = (f64, &'a Solution);
 
-/// Examines the back-calculation between two points: an error if it is not stable, a warning if that is not decided.
+/// Examines the back-calculation between two points: an error if unstable, a warning if stability is not decided.
 fn windup(
     file: &PlantFile<'_>,
     scheduled: &Scheduled,

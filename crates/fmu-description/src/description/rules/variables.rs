@@ -166,8 +166,8 @@ pub(super) fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
     }
 }
 
-/// Checks that a declared type exists and has the variable's kind, and that an Enumeration has a declared type and an
-/// item of it as its start value. Returns the type if it has the kind.
+/// Checks that a declared type exists and has the variable's kind, and that an Enumeration has a declared type and one
+/// of its items as start value. Returns the type if it has the kind.
 pub(super) fn check_declared_type<'a>(
     variable: &ScalarVariable,
     types: &HashMap<&str, &'a SimpleType>,

@@ -1,4 +1,4 @@
-//! The functions with an instance, except those for values and clocks.
+//! The functions with an instance, except functions for values and clocks.
 
 use std::ffi::c_void;
 
