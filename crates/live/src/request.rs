@@ -61,7 +61,8 @@ pub(crate) fn read(stream: &mut TcpStream, deadline: Instant) -> Result<HttpRequ
     Ok(request)
 }
 
-/// Appends the bytes that arrive next. Returns a refusal after `deadline`, and the error `None` if the connection ends.
+/// Appends the bytes that arrive next. The error is the answer 408 if nothing arrives before `deadline`, `None` if the
+/// connection ends.
 fn receive(stream: &mut TcpStream, deadline: Instant, bytes: &mut Vec<u8>) -> Result<(), Refusal> {
     let late = Some((408, "the request took too long"));
     let left = deadline.saturating_duration_since(Instant::now());

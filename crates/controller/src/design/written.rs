@@ -6,7 +6,8 @@ use super::Design;
 use super::schedule::{Point, Schedule};
 use crate::matrix::Matrix;
 
-/// Lists of the file, with the keys of their entries that are not written, because [`Design::parse`] computes them.
+/// The lists of the file whose entries have keys that are not written, because [`Design::parse`] computes these keys:
+/// names of the lists and of the keys.
 const POSITIONS: [(&str, &[&str]); 2] =
     [("reconfigurations", &["actuator", "restarted"]), ("combinations", &["mask"])];
 /// The matrices that are written first, in this order; other matrices follow.
