@@ -80,8 +80,10 @@ pub(super) fn table<'a>(
     let filled = |column: usize| rows.iter().any(|row| !matches!(row[column], Cell::Missing));
     let is_number = |cell: &Cell| matches!(cell, Cell::Number(_) | Cell::Complex(_));
     let numeric = |column: usize| rows.iter().any(|row| is_number(&row[column]));
-    let columns: Vec<usize> =
-        (0..heads.len()).filter(|column| *column == 0 || filled(*column)).collect();
+    let columns: Vec<(usize, bool)> = (0..heads.len())
+        .filter(|column| *column == 0 || filled(*column))
+        .map(|column| (column, numeric(column)))
+        .collect();
     html! {
         @if !rows.is_empty() {
             (scrolled(caption, &html! {
@@ -89,19 +91,19 @@ pub(super) fn table<'a>(
                     caption { (caption) }
                     thead {
                         tr {
-                            @for column in &columns {
-                                th scope="col" .number[numeric(*column)] { (heads[*column]) }
+                            @for (column, numeric) in &columns {
+                                th scope="col" .number[*numeric] { (heads[*column]) }
                             }
                         }
                     }
                     tbody {
                         @for row in rows {
                             tr {
-                                @for column in &columns {
+                                @for (column, numeric) in &columns {
                                     @if *column == 0 {
                                         (row_name(&row[0]))
                                     } @else {
-                                        (row[*column].render(numeric(*column)))
+                                        (row[*column].render(*numeric))
                                     }
                                 }
                             }
