@@ -71,8 +71,9 @@ impl<M: Model> Interface<M> {
         let (variables, fields) = split(model.variables());
         let mut description = general::general::<M>(model);
         description.log_categories = general::categories(model.log().is_some(), M::LOG_CATEGORIES);
-        describe_variables(&variables, &mut description)?;
-        let states = structure::states(&variables)?;
+        let named = structure::Variables::new(&variables);
+        describe_variables(&named, &mut description)?;
+        let states = structure::states(&named)?;
         let names = description.log_categories.iter().map(|category| category.name.clone());
         let mut interface = Self {
             reals: Vec::new(),

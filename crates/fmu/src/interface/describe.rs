@@ -1,6 +1,6 @@
 //! The description of the variables, by functions that are not generic over the model.
 
-use super::structure;
+use super::structure::{self, Variables};
 use crate::model::Failure;
 use crate::variable::{Base, Declaration, Enumeration};
 use fmu_description::unit::{DisplayUnit, Unit};
@@ -12,12 +12,12 @@ use fmu_description::{
 /// Describes time and the variables, with their units, types and dependencies. Types and value references of
 /// the variables are set later.
 pub(super) fn describe_variables(
-    variables: &[Declaration],
+    variables: &Variables,
     description: &mut ModelDescription,
 ) -> Result<(), Failure> {
     description.structure = structure::structure(variables)?;
     description.variables.push(time());
-    for variable in variables {
+    for variable in variables.declarations {
         define_unit(&mut description.units, variable)?;
         define_type(&mut description.types, variable)?;
         description.variables.push(describe_variable(variables, variable)?);
@@ -27,23 +27,23 @@ pub(super) fn describe_variables(
 
 /// Describes the variable; type and value reference are set later.
 fn describe_variable(
-    variables: &[Declaration],
+    variables: &Variables,
     variable: &Declaration,
 ) -> Result<ScalarVariable, Failure> {
     let (mut variability, mut initial) = (variable.variability, variable.initial);
     if let Base::Alias(of) = &variable.base {
-        let target = structure::find(variables, &variable.name, of)?;
-        if let Base::Alias(_) = variables[target].base {
+        let target = variables.find(&variable.name, of)?;
+        if let Base::Alias(_) = variables.declarations[target].base {
             let name = &variable.name;
             return Err(Failure::Error(format!("{name} is an alias of {of}, itself an alias")));
         }
-        variability = variables[target].variability;
+        variability = variables.declarations[target].variability;
         if variability == Variability::Constant {
             initial = Some(Initial::Exact);
         }
     }
     let state = variable.derivative_of.as_ref();
-    let state = state.map(|of| structure::find(variables, &variable.name, of)).transpose()?;
+    let state = state.map(|of| variables.find(&variable.name, of)).transpose()?;
     Ok(ScalarVariable {
         name: variable.name.clone(),
         value_reference: 0,
