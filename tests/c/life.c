@@ -20,7 +20,7 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
                                      fmi2String resources, const fmi2CallbackFunctions *functions,
                                      fmi2Boolean visible, fmi2Boolean logging) {
     Slave *slave = calloc(1, sizeof *slave);
-    (void)resources, (void)visible, (void)logging;
+    (void)resources, (void)visible;
     slave->functions = functions;
     snprintf(slave->name, sizeof slave->name, "%s", name);
     snprintf(slave->behaviour, sizeof slave->behaviour, "%s", guid);
@@ -29,6 +29,13 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
     slave->n = 3;
     slave->now.enumeration[INPUT] = slave->now.enumeration[OUTPUT] = 1;
     if (type != fmi2CoSimulation || misbehave(slave, "fmi2Instantiate") > fmi2Warning) {
+        free(slave);
+        return NULL;
+    }
+    if (is(slave, "silent without loggingOn")) {
+        if (logging) {
+            say(slave, fmi2Error, "there is no licence");
+        }
         free(slave);
         return NULL;
     }

@@ -90,6 +90,9 @@ EXPORT fmi3Instance fmi3InstantiateCoSimulation(
     fmi3String name, fmi3String token, fmi3String resources, bool visible, bool logging,
     bool event_mode, bool early_return, const fmi3ValueReference *intermediate, size_t count,
     void *environment, fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update) {
+    if (token != NULL && strcmp(token, "no event mode") == 0 && event_mode) {
+        return NULL;
+    }
     demand(name != NULL && token != NULL && !visible && !logging, "fmi3InstantiateCoSimulation");
     if (strcmp(token, "intermediate") == 0) {
         demand(count == 2 && intermediate[0] == U && intermediate[1] == A && update != NULL,
@@ -98,9 +101,6 @@ EXPORT fmi3Instance fmi3InstantiateCoSimulation(
         demand(intermediate == NULL && count == 0 && update == NULL, "no intermediate update");
     }
     demand(resources == NULL || resources[strlen(resources) - 1] == '/', "resourcePath");
-    if (strcmp(token, "no event mode") == 0 && event_mode) {
-        return NULL;
-    }
     Slave *slave = create(token);
     slave->event_mode = event_mode;
     slave->early_return = early_return;

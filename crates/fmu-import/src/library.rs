@@ -32,7 +32,7 @@ use fmu_description::abi::{
 
 use crate::crash::{Place, Slot};
 use crate::error::LoadError;
-use base::{Base, Loaded};
+use base::{Base, Loaded, instantiate};
 pub(crate) use canary::check_number;
 use functions::Functions;
 pub use load::preload;
@@ -183,20 +183,20 @@ impl Library {
         let callbacks = callbacks(&sink);
         let (c_name, c_guid, c_resources) = (c_string(name), c_string(guid), c_string(resources));
         let kind = interface.to_c();
-        place.enter(&NAME);
-        // SAFETY: terminated strings, callbacks that outlive the instance.
-        let pointer = self.functions.instantiate.map_or(std::ptr::null_mut(), |function| unsafe {
-            function(
-                c_name.as_ptr(),
-                kind,
-                c_guid.as_ptr(),
-                c_resources.as_ptr(),
-                Arc::as_ptr(&callbacks),
-                0,
-                0,
-            )
+        let pointer = instantiate(&place, &NAME, &sink, |logging| {
+            // SAFETY: terminated strings, callbacks that outlive the instance.
+            self.functions.instantiate.map_or(std::ptr::null_mut(), |function| unsafe {
+                function(
+                    c_name.as_ptr(),
+                    kind,
+                    c_guid.as_ptr(),
+                    c_resources.as_ptr(),
+                    Arc::as_ptr(&callbacks),
+                    0,
+                    logging.into(),
+                )
+            })
         });
-        place.leave();
         let slot = place.slot();
         let mut base = Base::new(self, pointer, NAME, place, sink, Version::V2)?;
         base.callbacks = Some(callbacks);

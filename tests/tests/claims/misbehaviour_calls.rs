@@ -271,6 +271,7 @@ fn an_instantiation_that_fails_reports_the_reason_or_that_the_fmu_gives_none() {
     for (behaviour, reason) in [
         ("fail in fmi2Instantiate", "as it was told"),
         ("return 17 in fmi2Instantiate", "no reason"),
+        ("silent without loggingOn", "there is no licence"),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let path = CFmu::that(behaviour).write(folder.path(), "slave");

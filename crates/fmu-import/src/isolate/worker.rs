@@ -295,8 +295,10 @@ fn download(answer: &[u8], reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> 
     Some(Ok(()))
 }
 
-/// Returns the text of an error and of its causes.
+/// Returns the text of an error and of its causes, without a cause whose text an earlier part contains.
 fn with_causes(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(Some(error), |error| error.source());
-    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
+    let causes = std::iter::successors(error.source(), |cause| cause.source());
+    causes.map(ToString::to_string).fold(error.to_string(), |text, cause| {
+        if text.contains(&cause) { text } else { format!("{text}: {cause}") }
+    })
 }

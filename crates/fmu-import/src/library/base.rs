@@ -61,6 +61,23 @@ pub(crate) struct Base<F> {
     library: Arc<Loaded<F>>,
 }
 
+/// Calls `function` by `call` with `loggingOn` false. If it returns null without a message, calls it again with
+/// `loggingOn` true, because many FMUs state the reason of a failure only then.
+pub(super) fn instantiate(
+    place: &Place,
+    function: &'static &'static str,
+    sink: &Sink,
+    call: impl Fn(bool) -> *mut c_void,
+) -> *mut c_void {
+    place.enter(function);
+    let mut pointer = call(false);
+    if pointer.is_null() && sink.is_empty() {
+        pointer = call(true);
+    }
+    place.leave();
+    pointer
+}
+
 impl<F: Copy> Base<F> {
     /// Takes over the instance that `function` has created; if it is null, returns an error with the messages of the
     /// FMU.

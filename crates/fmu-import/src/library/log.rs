@@ -44,6 +44,11 @@ impl Sink {
         sink
     }
 
+    /// Returns whether no message has been kept since the last [`Sink::take`].
+    pub(super) fn is_empty(&self) -> bool {
+        self.messages.lock().is_ok_and(|messages| messages.is_empty())
+    }
+
     /// Returns and clears the kept messages.
     pub(super) fn take(&self) -> Vec<String> {
         let messages = self.messages.lock().map(|mut messages| std::mem::take(&mut *messages));

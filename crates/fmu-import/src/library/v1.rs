@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use fmu_description::Version;
 use fmu_description::abi::{Status, StatusKind};
 
-use super::base::{Base, Loaded};
+use super::base::{Base, Loaded, instantiate};
 use super::calls::{derivatives, equations, function, modes, same_length, strings, values};
 use super::log::{Names, Sink, logger};
 use super::step::{PAUSE, finish_step};
@@ -61,8 +61,7 @@ impl Library {
         };
         let (c_name, c_guid, c_location) = (c_string(name), c_string(guid), c_string(location));
         let null = std::ptr::null_mut();
-        place.enter(function);
-        let pointer = match interface {
+        let pointer = instantiate(&place, function, &sink, |logging| match interface {
             // SAFETY: terminated strings, and callbacks by value.
             Interface::CoSimulation => self.functions.instantiate.map_or(null, |function| unsafe {
                 function(
@@ -74,17 +73,16 @@ impl Library {
                     0,
                     0,
                     Callbacks { functions: callbacks, step_finished: None },
-                    0,
+                    logging.into(),
                 )
             }),
             Interface::ModelExchange => {
                 // SAFETY: terminated strings, and callbacks by value.
                 self.functions.instantiate_model.map_or(null, |function| unsafe {
-                    function(c_name.as_ptr(), c_guid.as_ptr(), callbacks, 0)
+                    function(c_name.as_ptr(), c_guid.as_ptr(), callbacks, logging.into())
                 })
             }
-        };
-        place.leave();
+        });
         let base = Base::new(self, pointer, function, place, sink, Version::V1)?;
         Ok(Component { base, interface })
     }

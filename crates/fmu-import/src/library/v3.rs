@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use fmu_description::Version;
 
-use super::base::{Base, Loaded};
+use super::base::{Base, Loaded, instantiate};
 use super::log::{Sink, receive_message};
 use super::{Loading, c_string};
 use crate::crash::Place;
@@ -80,8 +80,9 @@ impl Library {
         Functions::open(loading, "", &functions::required(interface))
     }
 
-    /// Calls the C function of `arguments.interface`; returns null if it fails or is missing.
-    fn create(&self, arguments: &Instantiation<'_>, sink: &Sink) -> Instance {
+    /// Calls the C function of `arguments.interface` with `logging` as `loggingOn`; returns null if it fails or is
+    /// missing.
+    fn create(&self, arguments: &Instantiation<'_>, sink: &Sink, logging: bool) -> Instance {
         let (name, token) = (c_string(arguments.name), c_string(arguments.token));
         let resources = arguments.resources.map(c_string);
         let resources = resources.as_ref().map_or(std::ptr::null(), |path| path.as_ptr());
@@ -101,7 +102,7 @@ impl Library {
                         token,
                         resources,
                         false,
-                        false,
+                        logging,
                         event_mode,
                         early_return,
                         list,
@@ -114,7 +115,7 @@ impl Library {
             }),
             Interface::ModelExchange => self.functions.instantiate_equations.map(|function| {
                 // SAFETY: as above.
-                unsafe { function(name, token, resources, false, false, environment, log) }
+                unsafe { function(name, token, resources, false, logging, environment, log) }
             }),
             Interface::ScheduledExecution => self.functions.instantiate_scheduled.map(|function| {
                 let (update, lock) = (clock_update as ClockUpdate, preemption as Preemption);
@@ -126,7 +127,7 @@ impl Library {
                         token,
                         resources,
                         false,
-                        false,
+                        logging,
                         environment,
                         log,
                         update,
@@ -147,9 +148,8 @@ impl Library {
         let function = arguments.interface.function();
         let place = Place::new(arguments.name);
         let sink = Sink::new(&place, None);
-        place.enter(function);
-        let pointer = self.create(arguments, &sink);
-        place.leave();
+        let pointer =
+            instantiate(&place, function, &sink, |logging| self.create(arguments, &sink, logging));
         let base = Base::new(self, pointer, function, place, sink, Version::V3)?;
         Ok(Component { base, inputs: Box::default() })
     }
