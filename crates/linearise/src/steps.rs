@@ -190,9 +190,11 @@ fn maps(
     Ok(maps)
 }
 
-/// Returns the degree in time of the fitted coefficients, 0 without drift.
+/// Returns the degree in time of the fitted coefficients: 0 without drift, otherwise at most as many coefficients as the
+/// record has rows. The first record of one input has two rows for each coefficient of degree 0.
 fn degree(record: &Record) -> usize {
-    if record.is_drifting { DEGREE } else { 0 }
+    let (rows, width) = record.before.shape();
+    if record.is_drifting { DEGREE.min((rows / width).saturating_sub(1)) } else { 0 }
 }
 
 /// Fits the continuous system to a record; `None` if the fit is not finite or has no real logarithm. If the operating

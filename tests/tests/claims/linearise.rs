@@ -278,6 +278,21 @@ fn steps_away_from_an_equilibrium_are_within_their_error_and_the_drift_is_report
     assert!(actual.residual > 0.1);
 }
 
+/// The first record of one input has fewer rows than the coefficients of degree 2 in time of two states.
+#[test]
+fn steps_of_one_input_away_from_an_equilibrium_have_the_derivatives_by_hand() {
+    let (mut request, _) = tank();
+    (request.inputs, request.faults) = (names(&["pump"]), Vec::new());
+    request.states = names(&["level", "flow"]);
+    request.at = at(&[("level", "1"), ("flow", "1.5"), ("pump", "1.25")]);
+    request.step = Some(0.005);
+    let rows = [[-0.125, 0.5, 0.0], [0.0, -2.0, 2.0], [1.0, 0.0, 0.0], [0.25, 0.0, 0.0]];
+    let expected = DMatrix::from_row_slice(4, 3, rows.as_flattened());
+    let actual = linearise(&changed("DrainedTank.fmu", steps_only), &request).unwrap();
+    expect_close(&actual, &expected, 2e-3);
+    assert!(actual.residual > 0.1);
+}
+
 #[test]
 fn steps_of_a_falling_pendulum_are_not_accurate_enough_and_refused() {
     let (mut request, _) = pendulum("false");
