@@ -130,7 +130,7 @@ def test_a_controller_can_be_made_from_a_packed_controller_only(aso_ftc, refusal
 
 POORER = [
     ((), "1:9: cannot open Servo.fmu"),
-    ((NO_EXCHANGE, NO_DERIVATIVES), "name the variables that are its states among theta, omega"),
+    ((NO_EXCHANGE, NO_DERIVATIVES), "that are its states among theta, omega (`states` names them)"),
     ((NO_EXCHANGE, NO_DERIVATIVES, NO_FMU_STATE), "providesDirectionalDerivative"),
 ]
 
@@ -143,6 +143,12 @@ def test_an_fmu_that_cannot_be_linearised_is_refused_with_the_missing_capability
         poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu", *changes)
     message = refusal(SERVO)
     assert message.startswith("error: plant.toml:1:9: ") and expected in message
+
+
+def test_init_of_an_fmu_whose_states_are_not_listed_says_where_to_name_them(aso_ftc, tmp_path):
+    poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu", NO_EXCHANGE, NO_DERIVATIVES)
+    done = aso_ftc("design", "--init", tmp_path / "Servo.fmu", "--out", tmp_path / "servo.toml")
+    assert done.returncode == 2 and "`states` of a plant file states it" in done.stderr, done.stderr
 
 
 def test_the_method_of_linearisation_does_not_change_the_design(aso_ftc, tmp_path):

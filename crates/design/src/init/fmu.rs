@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use fmu_description::{Causality, Kind, ModelDescription, Variability};
 use fmu_import::Fmu;
-use linearise::{Linearise, linearise};
+use linearise::{Linearise, LineariseError, linearise};
 
 use crate::Error;
 use crate::init::draft::{Draft, Identification, Model};
@@ -30,7 +30,17 @@ pub(super) fn draft(path: &Path, out: &Path) -> Result<Draft, Error> {
     }
     let request =
         Linearise { inputs: inputs.clone(), outputs: outputs.clone(), ..Linearise::default() };
-    let linear = linearise(&fmu, &request).map_err(|error| invalid(files::sentence(&error)))?;
+    let linear = linearise(&fmu, &request).map_err(|error| {
+        let entry = match &error {
+            LineariseError::NoStep { .. } => "linearisation_step",
+            LineariseError::StatesNotNamed { .. } => "states",
+            _ => return invalid(files::sentence(&error)),
+        };
+        invalid(format!(
+            "{error} (--init cannot: `{entry}` of a plant file states it, beside `plant`, `actuators` \
+             and `measurements`)"
+        ))
+    })?;
     let named = |signal: &linearise::Signal| {
         let variable = description.variable(&signal.name);
         let text = variable.and_then(|variable| variable.description.clone());

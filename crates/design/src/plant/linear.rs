@@ -411,6 +411,7 @@ fn linearisation(
             LineariseError::NoStep { .. } => {
                 ("linearisation_step", " (`linearisation_step` states it)")
             }
+            LineariseError::StatesNotNamed { .. } => ("plant", " (`states` names them)"),
             _ => ("plant", ""),
         };
         file.error(&[place, "plant"], format!("{}: {error}{help}", path.display()))
