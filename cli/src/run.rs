@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use fmu_description::{Kind, number};
 use fmu_import::CallLog;
-use master::{Coupling, Port, System, by_direct_dependencies};
+use master::{CallError, Coupling, Failure, Port, System, by_direct_dependencies};
 use results::{STANDARD_OUTPUT, Selection, is_stream};
 use study::{
     AssemblyOptions, Config, Error, Every, LoadedConfig, Plan, PreparedRun, RealTime, Run, RunEnd,
@@ -56,10 +56,26 @@ pub(crate) fn run(options: &Options) -> u8 {
             }
         }
         Err(error) => {
-            tracing::error!("{}", files::sentence(error.as_ref()));
+            tracing::error!("{}", explained(error.as_ref()));
             2
         }
     }
+}
+
+/// Returns the sentence of an error, and how to see the messages of an FMU if it failed without one and its messages are
+/// not switched on.
+fn explained(error: &(dyn std::error::Error + 'static)) -> String {
+    let is_silent = |cause: &(dyn std::error::Error + 'static)| {
+        cause.downcast_ref::<CallError>().is_some_and(|call| {
+            matches!(call.failure, Failure::Status(_)) && call.messages.is_empty()
+        })
+    };
+    let mut causes = std::iter::successors(Some(error), |cause| cause.source());
+    let mut sentence = files::sentence(error);
+    if causes.any(is_silent) && !tracing::enabled!(target: logging::FMU, tracing::Level::INFO) {
+        sentence += "; with -v the FMU may state the reason";
+    }
+    sentence
 }
 
 /// A started run, with the data needed at its end.
@@ -328,7 +344,7 @@ impl ActiveRun {
                 interrupt::status()
             }
             RunEnd::Failed(error) => {
-                let error = error.sentence();
+                let error = explained(error);
                 message = format!("the run ended early, after t = {shown} s: {error}");
                 tracing::error!("{message}");
                 1

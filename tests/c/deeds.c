@@ -196,6 +196,9 @@ fmi2Status misbehave(Slave *slave, const char *function) {
             return fmi2Warning + k;
         }
     }
+    if (strcmp(deed, "fail silently") == 0) {
+        return fmi2Error;
+    }
     return strcmp(deed, "return 17") == 0 ? (fmi2Status)17 : fmi2OK;
 }
 

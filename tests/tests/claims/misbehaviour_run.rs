@@ -106,6 +106,17 @@ fn an_error_in_a_step_ends_the_run_with_fmu_call_and_time_and_keeps_the_results(
 }
 
 #[test]
+fn an_error_without_a_message_names_the_option_that_switches_messages_on() {
+    for function in ["fmi2EnterInitializationMode", "fmi2DoStep"] {
+        let fmu = CFmu::that(&format!("fail silently in {function}"));
+        Run::pair(&fmu, &[]).says(&[&format!("{function} returned fmi2Error; with -v")]);
+        let run = Run::pair(&fmu, &["-v"]);
+        run.says(&["returned fmi2Error"]);
+        assert!(!run.message.contains("with -v"), "{}", run.message);
+    }
+}
+
+#[test]
 fn an_error_when_outputs_are_read_ends_the_run_and_keeps_the_previous_rows() {
     let run = Run::pair(&CFmu::that("fail in fmi2GetReal"), &[]);
     run.expect(1, TO_T1 - 1);
