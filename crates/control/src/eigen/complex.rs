@@ -2,6 +2,7 @@
 
 use super::QR_ALGORITHM;
 use crate::Error;
+use crate::balance::Balance;
 use nalgebra::{Complex, DMatrix};
 
 /// Largest number of sweeps for one eigenvalue; two or three are usual.
@@ -13,9 +14,10 @@ const PATIENCE: usize = 20;
 
 /// Computes the eigenvalues of a square complex matrix, in no particular order; none for an empty matrix.
 ///
-/// Method: Hessenberg form, then the explicit QR algorithm with the shift of Wilkinson and exceptional shifts, on
-/// the part that has not been deflated. The result is exact for a matrix that differs by a few units of
-/// rounding of its norm. Symmetries of the matrix, and clusters of eigenvalues beside larger entries, do not stop it.
+/// Method: diagonal balancing of the moduli, Hessenberg form, then the explicit QR algorithm with the shift of Wilkinson
+/// and exceptional shifts, on the part that has not been deflated. The result is exact for a matrix that differs from
+/// the balanced one by a few units of rounding of its norm. Symmetries of the matrix, and clusters of eigenvalues beside
+/// larger entries, do not stop it.
 ///
 /// Source: J. H. Wilkinson, The algebraic eigenvalue problem (1965), chapter 8; exceptional shifts: LAPACK's
 /// `zlahqr`. The error is [`Error::NotConverged`], after 120 sweeps for one eigenvalue and for entries that are not
@@ -29,7 +31,9 @@ pub(crate) fn complex_eigenvalues(m: &DMatrix<Complex<f64>>) -> Result<Vec<Compl
     if !m.iter().all(|entry| entry.re.is_finite() && entry.im.is_finite()) {
         return Err(failed());
     }
-    let mut h = m.clone().hessenberg().unpack_h();
+    let scale = Balance::new(&m.map(Complex::norm)).scale;
+    let balanced = DMatrix::from_fn(n, n, |i, j| m[(i, j)] * (scale[j] / scale[i]));
+    let mut h = balanced.hessenberg().unpack_h();
     let norm = h.norm();
     let mut eigenvalues = Vec::with_capacity(n);
     let mut end = n;
@@ -155,6 +159,21 @@ mod tests {
         assert!(eigenvalues[0].norm() < 1e-12);
         let is_one = |value: &Complex<f64>| (value - Complex::ONE).norm() < 1e-10;
         assert!(eigenvalues[1..].iter().all(is_one), "{eigenvalues:?}");
+    }
+
+    /// S^-1 M S has the eigenvalues of M, here a cyclic permutation.
+    #[test]
+    fn the_units_of_the_rows_do_not_change_the_eigenvalues() {
+        const UNITS: [f64; 8] = [1e-12, 1.0, 3e15, 1e-3, 7e9, 1e-18, 1e6, 2e12];
+        let one = Complex::from_polar(1.0, 0.01);
+        let entry = |i: usize, j: usize| {
+            if (i + 1) % 8 == j { one * (UNITS[j] / UNITS[i]) } else { Complex::ZERO }
+        };
+        let eigenvalues = sorted(complex_eigenvalues(&DMatrix::from_fn(8, 8, entry)).unwrap());
+        let root = |k: u32| Complex::from_polar(1.0, 0.01 + TAU * f64::from(k) / 8.0);
+        for (value, expected) in eigenvalues.iter().zip(sorted((0..8).map(root).collect())) {
+            assert!((value - expected).norm() < 1e-13, "{value}, {expected}");
+        }
     }
 
     #[test]

@@ -242,6 +242,28 @@ fn no_plant_within_the_proven_fraction_is_unstable() {
     assert!(parts[25] > 0.6, "{parts:?}");
 }
 
+/// Entries of a stable state that nothing measures do not act on the loop: their channels have scales of another size.
+#[test]
+fn a_state_that_nothing_measures_leaves_the_proof_true() {
+    for (price, coupling) in [(1.0, 300.0), (0.1, 300.0), (1e-3, 20.0), (1e-4, 1.0)] {
+        let plant = StateSpace {
+            a: matrix(3, 3, &[-30.0, 0.0, 0.0, 1.0, 6.0, 0.0, 0.0, coupling, -20.0]),
+            b: matrix(3, 1, &[30.0, 0.0, 0.0]),
+            c: matrix(1, 3, &[0.0, 1.0, 0.0]),
+            d: DMatrix::zeros(1, 1),
+            domain: CONTINUOUS,
+        };
+        let controller = quadratic(&plant, price);
+        let tolerances = Tolerances::unless_structural(&plant, [0.1; 4]);
+        let actual = proven(&plant, &controller, &tolerances);
+        let family = EntryFamily::new(&plant, &tolerances).expect("fits");
+        let vertex = |size: f64| [size, -size, size, -size, -size, -size];
+        let is_stable = |size| is_stable(&family, &controller, &vertex(size));
+        assert!(is_stable(actual.fraction), "{actual:?}");
+        assert!(!is_stable(1.01 * actual.fraction), "{actual:?}");
+    }
+}
+
 #[test]
 fn an_unstable_loop_and_blocks_that_do_not_fit_are_refused() {
     let system = |pole: f64| StateSpace {
