@@ -94,6 +94,26 @@ robustness.tolerance = 0.0
 """
 
 
+# Longitudinal motion of a Boeing 747: B. Etkin and L. D. Reid, Dynamics of Flight (1996); measured are pitch and vertical speed.
+AIRCRAFT = """A = [[-0.00643, 0.0263, 0, -32.2], [-0.0941, -0.624, 820, 0], [-0.000222, -0.00153, -0.668, 0], [0, 0, 1, 0]]
+B = [[0], [-32.7], [-2.08], [0]]
+C = [[0, 0, 0, 1], [0, 1, 0, 0]]
+actuator_faults = "all"
+feedback.bandwidth = 0.13
+observer.bandwidth = 0.52
+"""
+
+
+def test_units_remove_a_peak_that_comes_from_signals_without_units(aso_ftc, tmp_path):
+    _, report = design_and_report(aso_ftc, tmp_path, AIRCRAFT)
+    (remedy,) = report["verdict"]["remedies"]
+    assert report["verdict"]["level"] == "red" and remedy["change"].startswith("state the `unit` of each measurement")
+    units = 'measurements = [{ name = "pitch", unit = "rad" }, { name = "speed", unit = "ft/s" }]\n'
+    _, report = design_and_report(aso_ftc, tmp_path, AIRCRAFT + units)
+    output = report["robustness"]["points"][1]
+    assert report["verdict"]["level"] == "green" and remedy["change"].endswith(f", {output['judged']:.5g}")
+
+
 def test_the_lines_that_follow_a_reason_of_the_verdict_give_the_stated_peaks(aso_ftc, tmp_path):
     _, report = design_and_report(aso_ftc, tmp_path, REMEDIED)
     verdict = report["verdict"]

@@ -53,7 +53,7 @@ pub struct Remedy {
     pub reason: String,
     /// What the change gives, in a sentence.
     pub change: String,
-    /// The lines of the plant file that replace those of the same name; empty if no change helps.
+    /// The lines of the plant file that replace those of the same name; empty if no requirement helps.
     pub lines: Vec<String>,
 }
 

@@ -9,9 +9,11 @@ use crate::budget::Budget;
 use crate::report::number::rounded;
 use crate::report::robustness::{LoopPoint, Remedy, Robustness};
 use crate::solve::designed::design;
+use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::requirements::{Bandwidth, Requirement};
 use plant_file::robustness::RobustnessLimits;
+use plant_file::signals::Signal;
 
 /// Factors on the speed of a loop, between the slowest and the fastest one.
 const FACTORS: [f64; 8] = [SLOWEST, 0.4, 0.6, 0.8, 1.25, 1.7, 2.5, FASTEST];
@@ -73,6 +75,34 @@ pub(crate) fn remedies(
     trials.sort_by(|one, other| one.distance.total_cmp(&other.distance));
     let remedy = |reason: Reason| reason.remedy(&trials, is_complete, &present, limits);
     reasons.into_iter().filter_map(remedy).collect()
+}
+
+/// Returns a remedy for each peak of S that is above its limit only because signals without units count as equal: to
+/// state the units.
+pub(crate) fn of_units(
+    nominal: &Solution,
+    robustness: Option<&Robustness>,
+    limits: &RobustnessLimits,
+) -> Vec<Remedy> {
+    let Some(robustness) = robustness else { return Vec::new() };
+    let linear = &nominal.linear;
+    let signals = [
+        (linear.actuators.as_slice(), "actuator"),
+        (linear.measurements.as_slice(), "measurement"),
+    ];
+    let remedy = |(point, (signals, kind)): (&LoopPoint, (&[Signal], &str))| {
+        let is_unknown = signals.len() > 1 && signals.iter().all(|signal| signal.unit.is_none());
+        let is_within = point.s_peak_scaled <= limits.amber;
+        let (_, reason) = peak_reason(point, limits).filter(|_| is_unknown && is_within)?;
+        let change = format!(
+            "state the `unit` of each {kind}: if they differ, the peak of S at the {} is judged in the units that make \
+             it least, {}",
+            point.point,
+            rounded(point.s_peak_scaled)
+        );
+        Some(Remedy { reason, change, lines: Vec::new() })
+    };
+    robustness.points.iter().zip(signals).filter_map(remedy).collect()
 }
 
 /// A reason of the verdict, and the aim of a change of the requirements.
