@@ -56,8 +56,10 @@ def test_a_feedback_faster_than_the_zero_allows_is_named_with_the_speed_that_it_
     # Theta / (pi - Theta) = 2 for a peak of 2.
     allowed = 2 * np.tan(np.pi / 3)
     assert float(warning.split("below ")[1].split()[0]) == pytest.approx(allowed, rel=1e-3)
-    slow = report(*plant, "feedback.bandwidth = 1\nobserver.bandwidth = 4\n")
-    assert not said(slow, "too fast") and max(peaks(slow)) < 2 < min(peaks(fast))
+    # A regulator whose loop gain crosses one at 20 rad/s need not make |S| small up to there.
+    for requirements in ("feedback.bandwidth = 1\nobserver.bandwidth = 4\n", "feedback.bandwidth = 20\nobserver.bandwidth = 4\n"):
+        slow = report(*plant, requirements)
+        assert not said(slow, "too fast") and max(peaks(slow)) < 2 < min(peaks(fast)), requirements
 
 
 def test_samples_too_far_apart_for_an_unstable_plant_are_named_with_the_time_that_is_short_enough(report):

@@ -10,7 +10,7 @@ use crate::Error;
 use crate::plant::linear::LinearPlant;
 use crate::report::number::rounded;
 use plant_file::PlantFile;
-use plant_file::requirements::{Bandwidth, Requirement};
+use plant_file::requirements::Requirement;
 
 /// Real part of a zero or pole, relative to its modulus, above which it counts as positive.
 const RIGHT: f64 = 1e-9;
@@ -131,8 +131,8 @@ fn of_zero(
         return None;
     }
     let message = format!(
-        "a feedback of {} rad/s is too fast for the plant: {name} makes the peak of S {} or more; below {} rad/s it can \
-         stay below {limit}",
+        "a feedback of {} rad/s is too fast for the plant: {name} makes the peak of S {} or more if |S| is at most 0.71 up \
+         to this speed; below {} rad/s it can stay below {limit}",
         rounded(speed),
         rounded(reached),
         rounded(allowed(zero, least, limit))
@@ -164,8 +164,9 @@ fn allowed(zero: Complex<f64>, least: f64, limit: f64) -> f64 {
     zero.re * (std::f64::consts::PI * (1.0 - 1.0 / t) / 2.0).tan()
 }
 
-/// Returns the modulus of the slowest eigenvalue that the file states for the feedback, or the stated bandwidth, rad/s;
-/// None for other requirements, and if all eigenvalues of a sampled loop are 0, with an infinite rate.
+/// Returns the modulus of the slowest eigenvalue that the file states for the feedback, rad/s; None for other requirements
+/// and if all eigenvalues of a sampled loop are 0, with an infinite rate. The loop gain of a regulator crosses one at its
+/// bandwidth, but |S| of the loop with the observer may be near one below it.
 fn requested(file: &PlantFile<'_>) -> Option<f64> {
     let slowest = |sizes: &mut dyn Iterator<Item = f64>| sizes.min_by(f64::total_cmp);
     match &file.feedback.requirement {
@@ -175,7 +176,6 @@ fn requested(file: &PlantFile<'_>) -> Option<f64> {
             let speed = slowest(&mut all.iter().map(|value| value.ln().norm() / period));
             speed.filter(|speed| speed.is_finite())
         }
-        Requirement::Bandwidth(Bandwidth { rate, is_stated: true }) => *rate,
         _ => None,
     }
 }
