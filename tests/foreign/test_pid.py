@@ -220,6 +220,12 @@ def test_what_a_refusal_names_is_designed(aso_ftc, tmp_path):
     assert remedy, refused
     designed(aso_ftc, tmp_path, f"{remedy[1]}\n{no_reference}")
 
+    no_integral = text.replace("[loop]", "integral = false\n[loop]")
+    refused = attempt(aso_ftc, tmp_path, no_integral).stderr
+    remedy = re.search(r"expected `(integral = true)`", refused)
+    assert remedy, refused
+    designed(aso_ftc, tmp_path, no_integral.replace("integral = false", remedy[1]))
+
     more = ([[-1, 0], [0, -2]], [[1], [1]], [[1, 0], [0, 1]], 1.0)
     refused = attempt(aso_ftc, tmp_path, plant_text(more, "PI")).stderr
     remedy = re.search(r"expected `pairs`, a table from actuators to measurements, ({.*}) for example", refused)

@@ -121,11 +121,14 @@ impl Pid {
             self.measurements().into_iter().map(|at| format!("{:?}", measurements[at].name));
         let names: Vec<_> = names.collect();
         let expected = format!("expected `reference.track = [{}]`", names.join(", "));
-        let Some(references) = references.filter(|references| references.integral) else {
-            let message =
-                format!("the integrals of the controllers are those of references: {expected}");
-            return Err(file.source.error(&self.place, message));
+        let integrals = "the integrals of the controllers are those of references";
+        let Some(references) = references else {
+            return Err(file.source.error(&self.place, format!("{integrals}: {expected}")));
         };
+        if !references.integral {
+            let message = format!("{integrals}: expected `integral = true`");
+            return Err(file.source.error(&references.action_places[0], message));
+        }
         let only_measurement = |row: RowDVector<f64>| {
             let mut terms = row.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
             terms.next().map(|(at, _)| at).filter(|_| terms.next().is_none())
