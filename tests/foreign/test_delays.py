@@ -159,6 +159,14 @@ def test_a_loop_that_only_the_approximation_holds_stable_is_red(aso_ftc, tmp_pat
     assert "no controller has a peak of S below 5.7" in done.stdout  # e^1.9 - 1
 
 
+def test_a_plant_without_a_stable_loop_is_refused_with_what_its_delay_forces(aso_ftc, tmp_path):
+    (tmp_path / "plant.toml").write_text(plant_text(([[2]], [[1]], [[1]]), [1.0], [0]), encoding="utf-8")
+    refused = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
+    assert refused.returncode == 2
+    # e^2 - 1
+    assert "loop is stable; no controller has a peak of S below 6.389" in refused.stderr, refused.stderr
+
+
 def test_the_worst_plant_keeps_its_delays_and_is_designed(aso_ftc, tmp_path):
     text = plant_text(CART, [0.1], [0.1, 0.4], '[robustness.tolerance]\nentries = { "B[2][1]" = 0.3, "A[2][2]" = 0.2 }')
     (tmp_path / "plant.toml").write_text(text, encoding="utf-8")

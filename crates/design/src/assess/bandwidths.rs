@@ -60,8 +60,8 @@ const WITHOUT_SPEED: f64 = 1.0;
 ///
 /// # Errors
 ///
-/// The gains of the first candidates cannot be computed: the error also says what no controller of the plant can reach.
-/// No candidate has a stable loop. The plant cannot be read.
+/// The gains of the first candidates cannot be computed, or no candidate has a stable loop: the error also says what no
+/// controller of the plant can reach. The plant cannot be read.
 pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantFile<'a>, Error> {
     if !file.feedback.is_open() && !file.observer.is_open() {
         return Ok(file.clone());
@@ -111,9 +111,14 @@ pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantF
             })
         }
         (None, None) => {
-            let message = "no bandwidth was found whose loop is stable; expected a requirement, \
-                           `feedback.eigenvalues` and `observer.eigenvalues` for example";
-            Err(file.error(&["feedback", "observer"], message).into())
+            let cause = "no bandwidth was found whose loop is stable";
+            let help = "expected a requirement, `feedback.eigenvalues` and `observer.eigenvalues` for \
+                        example";
+            let error = attainable::warnings(file, &plant)?.into_iter().next().map_or_else(
+                || file.error(&["feedback", "observer"], format!("{cause}; {help}")),
+                |limit| limit.after(cause),
+            );
+            Err(error.into())
         }
     }
 }
