@@ -108,7 +108,8 @@ pub(super) fn warnings(
                 .to_owned(),
         );
     }
-    warnings.extend(sampling(&estimate.continuous.a, logs[0].period));
+    let rows = logs.iter().map(|log| log.record.len()).max().unwrap_or_default();
+    warnings.extend(sampling(&estimate.continuous.a, logs[0].period, rows));
     warnings
 }
 
@@ -147,8 +148,9 @@ fn excitation(logs: &[Log], estimate: &Estimate) -> Option<String> {
     })
 }
 
-/// Returns a warning if the fastest mode of A is too fast or too slow for the samples.
-fn sampling(a: &DMatrix<f64>, period: f64) -> Option<String> {
+/// Returns a warning if the fastest mode of A is too fast or too slow for the samples. A mode that is slower than a log
+/// of `rows` samples is an integrator, for which no samples are too dense.
+fn sampling(a: &DMatrix<f64>, period: f64, rows: usize) -> Option<String> {
     let values = eigenvalues(a).ok()?;
     let fastest = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
     let rate = rounded(fastest, 3);
@@ -157,7 +159,9 @@ fn sampling(a: &DMatrix<f64>, period: f64) -> Option<String> {
             "a mode of {rate} rad/s is as fast as the samples, every {period} s: log faster, or state a smaller --order"
         ));
     }
-    (fastest * period < SLOW).then(|| {
+    #[expect(clippy::cast_precision_loss, reason = "a number of rows")]
+    let is_integrator = fastest * period * (rows as f64) < 1.0;
+    (fastest * period < SLOW && !is_integrator).then(|| {
         format!(
             "the fastest mode, {rate} rad/s, is slow for samples every {period} s: the mean of some rows as one row \
              would identify it more precisely"
@@ -196,8 +200,10 @@ mod tests {
     #[test]
     fn a_slow_mode_has_its_rate_in_the_warning() {
         let room = DMatrix::from_element(1, 1, -1.0 / 7200.0);
-        let warning = sampling(&room, 60.0).unwrap();
+        let warning = sampling(&room, 60.0, 1000).unwrap();
         assert!(warning.contains("mode, 0.000139 rad/s, is slow"), "{warning}");
-        assert_eq!(sampling(&room, 600.0), None);
+        assert_eq!(sampling(&room, 600.0, 1000), None);
+        // Within 100 minutes the room is an integrator.
+        assert_eq!(sampling(&room, 60.0, 100), None);
     }
 }
