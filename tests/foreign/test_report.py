@@ -588,6 +588,41 @@ def test_the_label_of_each_tick_is_its_value_also_of_a_single_one(aso_ftc, write
         assert page.evaluate(script.format(1.7e9, 1.7e9 + 10))[1][1] == "1700000005"
 
 
+# Notes the texts that each canvas shows: text, left and right end, and whether it is below the plot.
+TEXTS = """
+    globalThis.texts = new Map();
+    const { clearRect, fillText } = CanvasRenderingContext2D.prototype;
+    CanvasRenderingContext2D.prototype.clearRect = function (...place) {
+        texts.set(this.canvas, []);
+        clearRect.apply(this, place);
+    };
+    CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+        const half = this.measureText(text).width / 2;
+        texts.get(this.canvas).push([text, x - half, x + half, this.textAlign === "center"]);
+        fillText.call(this, text, x, y);
+    };"""
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+@pytest.mark.parametrize("width", [1200, 390])
+def test_labels_of_ticks_are_whole_and_apart_and_above_1e32_too(aso_ftc, write, tmp_path, width):
+    time = 1.7e9 + np.linspace(0, 10, 1001)
+    report(aso_ftc, write("own.csv", pd.DataFrame({"time": time, "x": np.sin(time), "large": 1e40 * np.sin(time)})))
+    with browser(tmp_path / "profile", width) as page:
+        page.call("Page.addScriptToEvaluateOnNewDocument", source=TEXTS)
+        page.open((tmp_path / "own.html").as_uri())
+        page.until(DRAWN)
+        for low, high in [(0, 10), (0.5, 8.3), (3.3, 3.34), (4, 5)]:
+            show(page, 1.7e9 + low, 1.7e9 + high)
+            plots = page.evaluate("Promise.resolve().then(() => Array.from(texts, ([{ width }, list]) => [width, list]))")
+            assert len(plots) == 2
+            for end, labels in plots:
+                below = [(left, right) for text, left, right, isBelow in labels if isBelow and text != "time in s"]
+                assert below and below[-1][1] <= end
+                assert all(right < left for (_, right), (left, _) in zip(below, below[1:], strict=False))
+            assert any("e+" in text for text, *_ in plots[1][1])
+
+
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_rows_at_one_time_are_drawn_also_where_times_are_seconds_apart(aso_ftc, write, tmp_path):
     with browser(tmp_path / "profile") as page:

@@ -91,13 +91,14 @@ class LinkedAxis {
     this.second = null; /* the place of the second cursor */
   }
 
-  /* Shows a range in all plots; null: everything, and the whole vertical axes. */
+  /* Shows a range in all plots, if an axis can; null: everything, and the whole vertical axes. */
   show(range) {
     if (range === null) this.heights.clear();
-    if (range !== null && !isRange(range, this.isLogarithmic)) return;
-    this.range = range;
-    for (const plot of this.plots) this.apply(plot);
-    this.changed(range ?? this.common);
+    if (range === null || isRange(range, this.isLogarithmic)) {
+      this.range = range;
+      for (const plot of this.plots) this.apply(plot);
+    }
+    this.changed(this.range ?? this.common);
   }
 
   /* Zooms a plot to the common range. */
@@ -191,13 +192,28 @@ class LinkedAxis {
     const grid = { stroke: colour("--grid"), width: scale };
     const common = { stroke: colour("--text"), grid, ticks: { ...grid, size: 5 * scale }, font: text(12),
       labelFont: text(12), gap: 4 * scale, filter: (self, places) => places };
+    let beyond = 0; /* the room that the last label of the horizontal axis takes beyond its end */
     const axis = (isX, isLog) => {
       const room = (self) => (isX ? self.bbox.width / (isLog ? 45 : 70) : self.bbox.height / 28);
       const most = (self) => Math.max(2, Math.floor(room(self) / scale / devicePixelRatio));
       const ends = (self) => [self.scales[isX ? "x" : "y"].min, self.scales[isX ? "x" : "y"].max];
       return { ...common,
-        splits: (self, index, low, high) => ticks.places(low, high, most(self), isLog),
-        values: (self, places) => ticks.labels(places, ...ends(self), most(self), isLog) };
+        incrs: [Number.MAX_VALUE], /* by default there are no ticks above 1e32 */
+        splits: (self, index, low, high) => {
+          const places = ticks.places(low, high, most(self), isLog);
+          if (!isX || isLog) return places;
+          const widest = this.breadth(self, ticks.labels(places), index);
+          const count = self.bbox.width / devicePixelRatio / Math.max(1, widest);
+          return places.length > count ? ticks.places(low, high, Math.min(most(self), count)) : places;
+        },
+        values: (self, places, index) => {
+          const texts = ticks.labels(places, ...ends(self), most(self), isLog);
+          if (isX && places.length > 0) {
+            const rest = self.bbox.width / devicePixelRatio - self.valToPos(places.at(-1), "x");
+            beyond = Math.ceil(this.breadth(self, texts.slice(-1), index) / 2 - rest);
+          }
+          return texts;
+        } };
     };
     const second = (self, curve) => {
       const index = self.valToIdx(this.second);
@@ -215,7 +231,7 @@ class LinkedAxis {
     const options = {
       width: (element.clientWidth || 800) * scale,
       height: height * scale,
-      padding: [8 * scale, 12 * scale, 0, 0],
+      padding: [8 * scale, () => Math.max(12 * scale, beyond), 0, 0],
       scales: {
         x: { time: false, distr: this.isLogarithmic ? 3 : 1, range: (self, low, high) => [low, high] },
         y: { distr: isLogarithmic ? 3 : 1, range: (self, low, high) => this.heights.get(self) ?? this.vertical(low, high, isLogarithmic, fromZero, self) },
