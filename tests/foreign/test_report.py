@@ -183,6 +183,19 @@ def test_numbers_have_six_digits_and_zero_no_sign(aso_ftc, write):
     assert [cell.text_content() for cell in cells] == list(constants.values())
 
 
+def test_times_in_seconds_since_1970_have_their_digits_in_the_tables(aso_ftc, write):
+    results = frame()
+    results["time"] += 1.7e9
+    other = results.assign(a=results["a"] * results["time"].eq(results["time"][700]))
+    page, _ = report(aso_ftc, write("own.csv", results), "--against", write("other.csv", other))
+    cells = page.xpath("//section[@aria-labelledby='statistics']//tr[th='a']/td[@title]")
+    for column, row in ((3, results["a"].idxmin()), (5, results["a"].idxmax())):
+        assert float(cells[column].text) == pytest.approx(results["time"][row], rel=0, abs=1e-6)
+    at = (results["a"] - other["a"]).abs().idxmax()
+    cells = page.xpath("//section[@aria-labelledby='differences']//tr[th='a']/td[@title]")
+    assert float(cells[1].text) == pytest.approx(results["time"][at], rel=0, abs=1e-6)
+
+
 def rates():
     """A variable with a value at every row, and one with a value at every second one."""
     slow = [10, np.nan, 20, np.nan, 30, np.nan, 40]

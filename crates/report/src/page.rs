@@ -168,7 +168,7 @@ fn largest(comparison: &Comparison, other: &str) -> Markup {
         } @else if let Some(largest) = comparison.differences.first() {
             p.outcome.warned {
                 "The largest difference to " (other) ", relative to the range, is that of " strong { (largest.name) } ": " (short(largest.largest))
-                " at t = " (short(largest.at)) " s, " (short(100.0 * largest.relative)) " % of its range. The plots start with the largest difference."
+                " at t = " (moment(largest.at)) " s, " (short(100.0 * largest.relative)) " % of its range. The plots start with the largest difference."
             }
         }
     }
@@ -214,7 +214,7 @@ fn timeline(marks: &[Mark], events: &Events) -> Markup {
                 tbody {
                     @for mark in marks.iter().take(LISTED) {
                         tr {
-                            td.number title=(mark.time) { (short(mark.time)) }
+                            (instant(mark.time))
                             td { (mark.kind.name()) }
                             th scope="row" { (mark.text) }
                         }
@@ -308,6 +308,21 @@ fn number(value: f64) -> Markup {
     html! { td.number title=(value) { (short(value)) } }
 }
 
+/// A cell with a time in s, and with all digits in a tooltip.
+fn instant(time: f64) -> Markup {
+    html! { td.number title=(time) { (moment(time)) } }
+}
+
+/// Returns a time in s with six significant digits; from 1e6 s on, such as seconds since 1970, with all digits down to
+/// 1 µs.
+fn moment(time: f64) -> String {
+    if (1e6..1e15).contains(&time.abs()) {
+        format!("{}", (time * 1e6).round() / 1e6)
+    } else {
+        short(time)
+    }
+}
+
 /// Returns a number with six significant digits; a dash for NaN.
 fn short(value: f64) -> String {
     // The sum has no negative zero.
@@ -347,10 +362,9 @@ fn statistics(content: &Content<'_>) -> Markup {
                             tr {
                                 th scope="row" { (column.name) }
                                 td { (column.unit.as_deref().unwrap_or_default()) }
-                                @for value in [
-                                    statistics.first, statistics.last, statistics.smallest.0, statistics.smallest.1,
-                                    statistics.largest.0, statistics.largest.1, statistics.mean, statistics.rms,
-                                ] { (number(value)) }
+                                @for value in [statistics.first, statistics.last] { (number(value)) }
+                                @for (value, time) in [statistics.smallest, statistics.largest] { (number(value)) (instant(time)) }
+                                @for value in [statistics.mean, statistics.rms] { (number(value)) }
                                 td { (basis(statistics)) }
                             }
                         }
@@ -387,7 +401,8 @@ fn bus_frames(messages: &[frames::Message], file: &Path) -> Markup {
                             tr {
                                 th scope="row" { (message.name) }
                                 td.number title=(message.count) { (message.count) }
-                                @for value in [message.first, message.last, 1e3 * message.shortest, 1e3 * message.mean(), 1e3 * message.longest] { (number(value)) }
+                                @for time in [message.first, message.last] { (instant(time)) }
+                                @for value in [1e3 * message.shortest, 1e3 * message.mean(), 1e3 * message.longest] { (number(value)) }
                             }
                         }
                     }
@@ -449,7 +464,8 @@ fn difference_table(name: &str, differences: &[Difference]) -> Markup {
                         @for difference in differences {
                             tr {
                                 th scope="row" { (difference.name) }
-                                @for value in [difference.largest, difference.at, difference.rms, difference.relative] { (number(value)) }
+                                (number(difference.largest)) (instant(difference.at))
+                                @for value in [difference.rms, difference.relative] { (number(value)) }
                                 td.number { (difference.rows) }
                             }
                         }
