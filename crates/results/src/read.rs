@@ -37,7 +37,7 @@ enum Layout {
 type Visitor<'a> = dyn FnMut(f64, &[f64]) + 'a;
 
 impl Table {
-    /// Opens a file and reads the names and units of the columns; for Parquet also their types.
+    /// Opens a file and reads the names, units and types of the columns.
     ///
     /// # Errors
     ///
@@ -64,9 +64,10 @@ impl Table {
     }
 
     /// Returns the columns in the order of the file, including the time; in MAT files, columns that vary come first.
-    /// Columns of CSV and MAT files have the type Real, integers of Parquet the type Integer, also integers with 64
-    /// bits; decimals and timestamps (in s) of Parquet have the type Real. Columns of CSV have no unit, unless the
-    /// second line of the file states units.
+    /// Columns of MAT files have the type Real, integers of Parquet the type Integer, also integers with 64
+    /// bits; decimals and timestamps (in s) of Parquet have the type Real. Columns of CSV have the type Boolean or
+    /// Integer if the first 1000 rows have only such values and, for an Integer, the file has a Real such as `0.0`;
+    /// they have no unit, unless the second line of the file states units.
     #[must_use]
     pub fn columns(&self) -> &[Column] {
         &self.columns

@@ -13,6 +13,8 @@ use crate::ColumnKind;
 const BUFFER: usize = 256 * 1024;
 /// Number of bytes at the start of a file that are examined to tell a text from a binary file.
 const SNIFFED: usize = 1024;
+/// Largest number of rows at the start of a file from which the types of its columns are taken.
+const TYPED: usize = 1000;
 
 /// The layout of a CSV file.
 #[derive(Debug)]
@@ -102,9 +104,46 @@ pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError
             for (column, unit) in columns.iter_mut().zip(units) {
                 column.unit = Some(unit).filter(|unit| !unit.is_empty());
             }
+            second.clear();
         }
+        set_kinds(&mut columns, &mut reader, &mut second);
     }
     Ok((layout, columns))
+}
+
+/// Sets the types of the columns from the first rows; `row` is the first one. The cells of a Boolean column are `True`
+/// or `False`, those of an Integer column are digits. Digits alone are Reals if the file has no Real such as `0.0`:
+/// then its writer may write `0` for it. This program, pandas and polars write `0.0`.
+fn set_kinds(columns: &mut [Column], reader: &mut Reader<Box<dyn Read>>, row: &mut ByteRecord) {
+    let mut kinds: Vec<Option<ColumnKind>> = vec![None; columns.len()];
+    let mut writes_points = false;
+    for _ in 0..TYPED {
+        for (kind, cell) in kinds.iter_mut().zip(row.iter()) {
+            let cell = cell.trim_ascii();
+            writes_points |= cell.ends_with(b".0");
+            let of_cell = match cell {
+                b"" => continue,
+                b"True" | b"true" | b"False" | b"false" => ColumnKind::Boolean,
+                _ if is_integer(cell) => ColumnKind::Integer,
+                _ => ColumnKind::Real,
+            };
+            let is_same = kind.is_none_or(|known| known == of_cell);
+            *kind = Some(if is_same { of_cell } else { ColumnKind::Real });
+        }
+        if !reader.read_byte_record(row).is_ok_and(|is_row| is_row) {
+            break;
+        }
+    }
+    for (column, kind) in columns.iter_mut().zip(kinds) {
+        let stated = kind.filter(|kind| writes_points || *kind != ColumnKind::Integer);
+        column.kind = stated.unwrap_or(ColumnKind::Real);
+    }
+}
+
+/// Whether a cell consists of digits, with or without a sign.
+fn is_integer(cell: &[u8]) -> bool {
+    let digits = cell.strip_prefix(b"-").unwrap_or(cell);
+    !digits.is_empty() && digits.iter().all(u8::is_ascii_digit)
 }
 
 /// Returns the text of a cell in the line of the units, without the brackets around it.

@@ -46,6 +46,21 @@ fn both_formats_give_back_every_number_that_was_written() {
 }
 
 #[test]
+fn columns_of_csv_are_integers_where_reals_have_a_point() {
+    use ColumnKind::{Boolean, Integer, Real};
+    let folder = tempfile::tempdir().unwrap();
+    let rows = |time: &str| format!("time,n,x,on,e\n{time},0,0,True,\n0.5,-7,0.5,False,3\n");
+    for (time, expected) in
+        [("0.0", [Real, Integer, Real, Boolean, Integer]), ("0", [Real, Real, Real, Boolean, Real])]
+    {
+        let table = written(folder.path(), "a.csv", &rows(time));
+        let kinds: Vec<ColumnKind> = table.columns().iter().map(|column| column.kind).collect();
+        assert_eq!(kinds, expected, "{time}");
+        assert_eq!(table.column(1).unwrap(), [0.0, -7.0]);
+    }
+}
+
+#[test]
 fn a_last_line_that_was_cut_is_no_row_and_one_before_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let table = written(folder.path(), "a.csv", "time,x,y\n0,1,2\n1,3,4\n2,5");
