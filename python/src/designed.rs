@@ -1,7 +1,7 @@
 //! Designs of controllers.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 use control::Domain;
 use control::robustness::Point;
@@ -9,6 +9,7 @@ use design::{LogOptions, TimeLimits, new_plant_file};
 use nalgebra::DMatrix;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use rayon::ThreadPoolBuilder;
 
 use crate::error;
 use crate::guard::guarded;
@@ -20,12 +21,23 @@ pub(crate) struct Designed {
     design: Mutex<design::Design>,
 }
 
+/// The process that has the threads of rayon's global pool.
+static POOL: LazyLock<u32> = LazyLock::new(std::process::id);
+
 /// Calls `work` with the interpreter released; raises an error of `work` as a `DesignError`.
 fn detached<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> Result<T, design::Error> + Send,
 ) -> PyResult<T> {
-    guarded(py, work)?.map_err(|error| error::design(&error).raise(py))
+    let result = guarded(py, || {
+        if *POOL != std::process::id() {
+            // A forked process would wait for ever for the threads of its parent. A pool that consists of this thread
+            // serves all later calls of this thread, too; to build it again is an error.
+            let _ = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+        }
+        work()
+    });
+    result?.map_err(|error| error::design(&error).raise(py))
 }
 
 /// Designs the controller of the plant file at `path`.

@@ -1,8 +1,10 @@
 """Designs: the command is the reference."""
 
 import json
+import multiprocessing
 import pickle
 import subprocess
+from operator import attrgetter
 from pathlib import Path
 
 import aso_ftc as af
@@ -253,6 +255,15 @@ def test_a_design_travels_and_is_changed(servo):
     assert str(faster).startswith(faster.report["description"]) and "peak of S" in str(faster)
     of_file = af.design(PLANT)
     assert pickle.loads(pickle.dumps(of_file)).design_file == of_file.design_file
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="processes are not forked here")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_forked_process_computes_the_gains_of_its_parent(servo):
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        # A design that is pickled is computed again where it arrives.
+        (gains,) = pool.map_async(attrgetter("gains"), [servo]).get(timeout=30)
+    assert all(np.array_equal(gains[name], gain) for name, gain in servo.gains.items())
 
 
 def test_matrices_alone_get_bandwidths_and_a_green_verdict():
