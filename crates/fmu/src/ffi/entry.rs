@@ -37,7 +37,9 @@ macro_rules! common_entry_points {
             };
             set_fmu_state = $set(state: *mut c_void), instance => instance.restore(snapshot(state)?);
             free_fmu_state = $free(state: *mut *mut c_void), _instance => {
-                free_state::<M>(borrow_state(state)?);
+                if !state.is_null() {
+                    free_state::<M>(borrow_state(state)?);
+                }
                 Ok(())
             };
             serialized_fmu_state_size = $size(state: *mut c_void, size: *mut usize),

@@ -3,7 +3,7 @@
 use super::{Call, Outcome, Record, SavedState};
 use crate::array::{Array, Shape};
 use crate::choice::{Choice, usable};
-use crate::prediction::{Core, ERROR, OK};
+use crate::prediction::{Core, OK};
 
 fn slot(choice: &mut Choice) -> usize {
     usize::from(choice.byte() % 3)
@@ -46,9 +46,8 @@ pub(super) fn set(call: &mut Call) -> Outcome {
 pub(super) fn free(call: &mut Call) -> Outcome {
     let (slot, nowhere) = (slot(&mut call.choice), call.choice.rarely());
     if nowhere {
-        // "If a null pointer is provided, the call is ignored" (section 2.1.8); the standard does
-        // not say which pointer it means.
-        return Outcome::new(call.importer.free_fmu_state(None), OK | ERROR);
+        // "If a null pointer is provided, the call is ignored" (section 2.1.8).
+        return Outcome::new(call.importer.free_fmu_state(None), OK);
     }
     let SavedState { saved, .. } = &mut call.stores.saved_states[slot];
     let status = call.importer.free_fmu_state(Some(saved));
