@@ -40,7 +40,7 @@ pub(super) struct Node {
 }
 
 /// Reads a file whose root element is `root` in the namespace that ends in `space`. Also returns
-/// a warning with its position for each undeclared prefix.
+/// a warning with its position for a root element in another SSP namespace, and for each undeclared prefix.
 ///
 /// Returns an error if the file is too large or not well-formed, has another root element, or states a version
 /// other than 1.x and 2.x.
@@ -56,9 +56,9 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<S
     let mut scope = Scope::default();
     scope.open(&element);
     let namespace = scope.space(&element).unwrap_or_default().to_owned();
-    let is_root =
-        namespace == required || (namespace.is_empty() && scope.has_assumed_prefix(&element));
-    if !is_root || local(&element.name) != root {
+    let is_ssp = namespace.starts_with(NAMESPACE)
+        || (namespace.is_empty() && scope.has_assumed_prefix(&element));
+    if !is_ssp || local(&element.name) != root {
         return Err(SspError::Content {
             at: element.at,
             actual: format!("namespace {namespace:?}"),
@@ -66,9 +66,14 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<S
             expected: format!("the root element {root} of the namespace {required:?}"),
         });
     }
+    let mut warnings = Vec::new();
+    if !namespace.is_empty() && namespace != required {
+        let at = element.at;
+        warnings.push(format!("{at}: expected the namespace {required:?}, found {namespace:?}"));
+    }
     let node = scope.node(element)?;
     node.version()?;
-    let warnings = scope.undeclared.iter().map(|(prefix, at)| undeclared(prefix, *at)).collect();
+    warnings.extend(scope.undeclared.iter().map(|(prefix, at)| undeclared(prefix, *at)));
     Ok((node, warnings))
 }
 

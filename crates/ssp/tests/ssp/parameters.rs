@@ -273,3 +273,16 @@ fn a_value_for_a_connector_that_leads_nowhere_changes_nothing() {
     let opened = bench.open(&system, "").unwrap();
     assert_eq!(settings(&opened.assembly), [""; 0]);
 }
+
+#[test]
+fn a_parameter_set_of_another_namespace_of_ssp_is_read_with_a_warning() {
+    let bench = bench();
+    let set = ssv(&real("q", "2.5")).replace("SystemStructureParameterValues", "ParameterValues");
+    bench.file("q.ssv", set);
+    let list = bindings(&[r#"<ssd:ParameterBinding source="q.ssv"/>"#.to_owned()]);
+    let opened = bench.open(&root(&component("c", "a.fmu", "", &list), ""), "").unwrap();
+    assert_eq!(settings(&opened.assembly), ["c.q = 2.5"]);
+    let warnings = opened.warnings.join("\n");
+    let expected = "found \"http://ssp-standard.org/SSP1/ParameterValues\"";
+    assert!(opened.warnings.len() == 1 && warnings.ends_with(expected), "{warnings}");
+}
