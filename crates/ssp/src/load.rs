@@ -238,8 +238,11 @@ impl Loader {
             at: source.at,
             ..ElementBase::default()
         };
-        let definition =
-            File { shown, base: file.base.clone(), definitions: dictionary.definitions.clone() };
+        // As for parameter sets: what the dictionary does not define is looked up in the file around it.
+        let mut definitions = dictionary.definitions;
+        definitions.units.extend_from_slice(&file.definitions.units);
+        definitions.enumerations.extend_from_slice(&file.definitions.enumerations);
+        let definition = File { shown, base: file.base.clone(), definitions };
         let path = format!("{}.{}", self.tree.nodes[system].path, source.name);
         let path = path.trim_start_matches('.').to_owned();
         let place = Place { parent: Some(system), path, depth: 0, outer: None };

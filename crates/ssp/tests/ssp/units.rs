@@ -265,6 +265,23 @@ fn an_inline_parameter_set_uses_the_definitions_of_the_enclosing_file() {
 }
 
 #[test]
+fn an_inline_signal_dictionary_uses_the_units_of_the_enclosing_file() {
+    let bench = Bench::new();
+    bench.fmu("a.fmu", &format!("y output {}", real("m")));
+    bench.fmu("b.fmu", "u input Real");
+    let elements = component("a", "a.fmu", "y output", "")
+        + &component("b", "b.fmu", "u input", "")
+        + r#"<ssd:SignalDictionaryReference name="r" dictionary="bus"><ssd:Connectors><ssd:Connector name="s" kind="inout"/></ssd:Connectors></ssd:SignalDictionaryReference>"#;
+    let connections = connection("a.y", "r.s", "", "") + &connection("r.s", "b.u", "", "");
+    let dictionaries = r#"<ssd:SignalDictionaries><ssd:SignalDictionary name="bus"><ssb:SignalDictionary version="1.0">
+<ssb:DictionaryEntry name="s"><ssc:Real unit="km"/></ssb:DictionaryEntry></ssb:SignalDictionary></ssd:SignalDictionary></ssd:SignalDictionaries>"#;
+    let units = r#"<ssd:Units><ssc:Unit name="km"><ssc:BaseUnit m="1" factor="1000"/></ssc:Unit></ssd:Units>"#;
+    let opened = bench.open(&(root(&elements, &connections) + dictionaries), units).unwrap();
+    assert_eq!(links(&opened.assembly), ["a.y -> b.u * 0.001 + 0.0"]);
+    assert_eq!(opened.warnings, [""; 0]);
+}
+
+#[test]
 fn a_parameter_of_5_kelvin_sets_a_difference_of_5_degrees_celsius() {
     let bench = Bench::new();
     bench.fmu("a.fmu", &format!("p parameter {}", difference("degC")));
