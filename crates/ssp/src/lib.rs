@@ -145,6 +145,7 @@ pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspErr
 fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
     for (index, node) in tree.nodes.iter().enumerate() {
         let Content::Fmu(_) = node.content else { continue };
+        let mut missing = Vec::new();
         for connector in &node.connectors {
             let vertex = Vertex { node: index, connector: connector.name.clone() };
             let name = tree.name(&vertex);
@@ -159,7 +160,7 @@ fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
                 continue;
             }
             let Some(variable) = tree.variable(&vertex) else {
-                warnings.push(format!("{name}: the FMU has no such variable"));
+                missing.push(connector.name.as_str());
                 continue;
             };
             let (stated, declared) = tree.measures(&vertex);
@@ -180,10 +181,14 @@ fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
                 ));
             }
         }
+        if !missing.is_empty() {
+            let names = parameters::listed(&missing);
+            warnings.push(format!("{}: the FMU has no variable {names}", node.path));
+        }
     }
 }
 
-/// Returns the XML element of a type of FMI 2.0; `None` for other types.
+/// Returns the XML element of a type that is one element; `None` for clocks and arrays.
 fn element(kind: &Type) -> Option<&'static str> {
     match kind {
         Type::Real(_) => Some("Real"),
@@ -191,7 +196,8 @@ fn element(kind: &Type) -> Option<&'static str> {
         Type::Boolean => Some("Boolean"),
         Type::String => Some("String"),
         Type::Enumeration(_) => Some("Enumeration"),
-        Type::Binary | Type::Clock | Type::Array(_) | Type::Clocked(_) => None,
+        Type::Binary => Some("Binary"),
+        Type::Clock | Type::Array(_) | Type::Clocked(_) => None,
     }
 }
 

@@ -49,6 +49,13 @@ pub(super) fn settings(
     Ok(binder.settings)
 }
 
+/// Joins `names` by commas; states the number of the names beyond the first [`NAMED`].
+pub(super) fn listed(names: &[&str]) -> String {
+    let rest = names.len().saturating_sub(NAMED);
+    let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+    names[..names.len() - rest].join(", ") + &more
+}
+
 fn depth(tree: &Tree, node: usize) -> usize {
     std::iter::successors(Some(node), |node| tree.nodes[*node].parent).count()
 }
@@ -138,10 +145,8 @@ impl Binder<'_> {
         if names.is_empty() {
             return;
         }
-        let rest = names.len().saturating_sub(NAMED);
-        let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
-        let names = names[..names.len() - rest].join(", ");
-        self.warnings.push(format!("parameter set {set:?}: {owner} has no {names}{more}: ignored"));
+        let names = listed(&names);
+        self.warnings.push(format!("parameter set {set:?}: {owner} has no {names}: ignored"));
     }
 
     /// Applies one parameter to every variable and connector with the target name of `entry`; if there is none, adds

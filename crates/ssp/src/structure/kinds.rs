@@ -107,11 +107,10 @@ pub enum Dimension {
 }
 
 impl Type {
-    /// Describes a type that FMI 2.0 does not have; `None` for the types of FMI 2.0.
+    /// Describes an array, a clock or a value of a clock, which FMI 2.0 does not have; `None` for other types.
     #[must_use]
     pub fn beyond_fmi2(&self) -> Option<String> {
         Some(match self {
-            Type::Binary => "a binary value".to_owned(),
             Type::Clock => "a clock".to_owned(),
             Type::Clocked(clock) => format!("a value of the clock {clock}"),
             Type::Array(dimensions) => {

@@ -120,6 +120,21 @@ fn what_nothing_drives_is_said_and_left_to_the_fmu() {
 }
 
 #[test]
+fn connectors_without_a_variable_are_one_warning_for_each_fmu() {
+    let connectors = "y output\nk1 parameter\nk2 parameter\nk3 parameter\nk4 parameter\nk5 parameter\nk6 parameter";
+    let elements =
+        component("a", "a.fmu", connectors, "") + &component("b", "b.fmu", "w input", "");
+    let opened = bench().open(&root(&elements, ""), "").unwrap();
+    assert_eq!(
+        opened.warnings,
+        [
+            "a: the FMU has no variable k1, k2, k3, k4, k5 and 1 more",
+            "b: the FMU has no variable w"
+        ]
+    );
+}
+
+#[test]
 fn a_connected_variable_without_a_connector_is_accepted_and_said() {
     let elements = component("a", "a.fmu", "", "") + &component("b", "b.fmu", "u output", "");
     let opened = bench().open(&root(&elements, &connection("a.y", "b.v", "", "")), "").unwrap();

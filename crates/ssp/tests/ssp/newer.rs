@@ -61,7 +61,6 @@ fn what_fmi_2_does_not_have_is_named_and_refused_where_it_is_connected() {
         (array, "an array of 3 x m elements"),
         ("<ssc:Clock intervalVariability='constant'/>", "a clock"),
         ("<ssc:Real/><ssd:Clock name='c'/>", "a value of the clock c"),
-        ("<ssc:Binary/>", "a binary value"),
     ] {
         let elements = component("a", "a.fmu", &format!("y output {kind}"), "")
             + &component("b", "b.fmu", "u input", "");
@@ -73,6 +72,15 @@ fn what_fmi_2_does_not_have_is_named_and_refused_where_it_is_connected() {
             format!("a.y is {words}, which FMI 2.0 does not have, so it cannot be connected");
         assert!(text.ends_with(&expected), "{text}");
     }
+    // Dymola writes Binary for the types of Modelica, such as Modelica.Units.SI.Time: the FMU decides.
+    let elements = component("a", "a.fmu", "y output <ssc:Binary/>", "")
+        + &component("b", "b.fmu", "u input", "");
+    let opened = bench.open(&root(&elements, &connection("a.y", "b.u", "", "")), "").unwrap();
+    assert_eq!(links(&opened.assembly), ["a.y -> b.u"]);
+    assert_eq!(
+        opened.warnings,
+        ["a.y is of type Binary in the system structure and Real in the FMU"]
+    );
     let elements = component("a", "a.fmu", "", "") + &component("b", "b.fmu", "", "");
     let part = connection("a.y", "b.u", "", "startIndices=\"1\"");
     let text = bench.refusal(&root(&elements, &part), "");
