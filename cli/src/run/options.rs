@@ -439,19 +439,16 @@ impl Options {
                 }
             }
             [path] if has_ending(path, "toml") => return Ok((LoadedConfig::read(path)?, None)),
-            [path]
-                if path.is_dir()
-                    || ["ssp", "ssd", "xml"].iter().any(|ending| has_ending(path, ending)) =>
-            {
-                config.system = Some(path.clone());
-            }
-            [path] => bail!(
-                "{}: expected a system, that is an .ssp, an .ssd, an OspSystemStructure.xml or a .toml, \
-                 or an .fmu",
-                path.display()
-            ),
-            several @ [_, _, ..] => {
-                let paths: Vec<_> = several.iter().map(|path| path.display().to_string()).collect();
+            [path] if is_system(path) => config.system = Some(path.clone()),
+            paths @ [_, ..] => {
+                if let Some(path) = paths.iter().find(|path| !is_fmu(path) && !is_system(path)) {
+                    bail!(
+                        "{}: expected a system, that is an .ssp, an .ssd, an OspSystemStructure.xml or a .toml, \
+                         or an .fmu",
+                        path.display()
+                    );
+                }
+                let paths: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
                 bail!(
                     "expected one system or any number of FMUs, found {}; --fmu NAME=FMU adds an FMU to a system",
                     paths.join(", ")
@@ -599,6 +596,11 @@ fn resumed_path(path: &Path, time: f64) -> PathBuf {
 /// Whether `path` has the extension of an FMU, or is the folder of an unpacked one.
 fn is_fmu(path: &Path) -> bool {
     has_ending(path, "fmu") || path.join("modelDescription.xml").is_file()
+}
+
+/// Whether `path` is a folder, or has the extension of a system.
+fn is_system(path: &Path) -> bool {
+    path.is_dir() || ["ssp", "ssd", "xml", "toml"].iter().any(|ending| has_ending(path, ending))
 }
 
 /// Returns the name of the file without extension, with a number if the configuration already has an FMU of this

@@ -108,6 +108,7 @@ fn misuse_is_refused_with_the_expected_input() {
     fails(&run(&["run", "some.fmu"]), 2, &["some.fmu"]);
     fails(&run(&["run", "some.txt"]), 2, &["some.txt", ".fmu", ".ssp"]);
     fails(&run(&["run", "some.ssp", "b.fmu"]), 2, &["b.fmu", "--fmu NAME=FMU"]);
+    fails(&run(&["run", "some.ssp", "--report", "r.html"]), 2, &["r.html: expected a system"]);
     fails(&run(&["run", "none.toml"]), 2, &["none.toml"]);
     fails(&run(&["run", "none.ssp"]), 2, &["none.ssp"]);
     fails(&bench.run(&["a.toml", "--plant", "b.fmu"]), 2, &["--plant"]);
