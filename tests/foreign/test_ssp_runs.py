@@ -94,7 +94,8 @@ def test_an_fmu_without_a_library_for_this_platform_is_refused_with_the_platform
     alone = tmp_path / "Windows.fmu"
     alone.write_bytes(for_windows(packed["plant"].read_bytes()))
     out = tmp_path / "out"
-    for system in ([path], ["--fmu", f"plant={alone}"]):
+    equations = ["--interface", "plant=model-exchange"]
+    for system in ([path], ["--fmu", f"plant={alone}"], ["--fmu", f"plant={alone}", *equations]):
         done = aso_ftc("run", *system, "--out", out)
         assert done.returncode == 2 and not out.exists()
         assert "plant: " in done.stderr

@@ -214,7 +214,9 @@ impl<'a> FmuOpener<'a> {
     ) -> Result<Box<dyn Slave>, Error> {
         let name = &element.name;
         let equations = fmu.instantiate_equations(name);
-        let mut equations = equations.map_err(|error| as_shown(error.into(), element))?;
+        let equations =
+            equations.map_err(|error| as_shown(Error::from(error).within(name), element));
+        let mut equations = equations?;
         if let Some(log) = self.log {
             equations = Box::new(log.listen_to_equations(name, equations));
         }
