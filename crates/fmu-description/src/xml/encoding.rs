@@ -22,12 +22,12 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), Pa
         if encoding == UTF_8 {
             return Ok((utf8(rest)?, Some(encoding_warning("a byte order mark".to_owned()))));
         }
-        return decode_as(rest, encoding);
+        return decode_as(rest, encoding, encoding.name());
     }
     // Without a byte order mark, the first character "<" distinguishes the two forms of UTF-16.
     match bytes {
-        [b'<', 0, ..] => return decode_as(bytes, UTF_16LE),
-        [0, b'<', ..] => return decode_as(bytes, UTF_16BE),
+        [b'<', 0, ..] => return decode_as(bytes, UTF_16LE, UTF_16LE.name()),
+        [0, b'<', ..] => return decode_as(bytes, UTF_16BE, UTF_16BE.name()),
         _ => {}
     }
     let Some(declared) = declared(bytes) else {
@@ -43,18 +43,20 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), Pa
         }
         // A file that declares UTF-16 in single bytes is not UTF-16.
         Some(encoding) if encoding != UTF_16LE && encoding != UTF_16BE => {
-            decode_as(bytes, encoding)
+            decode_as(bytes, encoding, &declared)
         }
         _ => Err(ParseError::Encoding { actual: format!("encoding {declared:?}") }),
     }
 }
 
-/// Decodes bytes in another encoding than UTF-8, with a warning.
+/// Decodes bytes in another encoding than UTF-8, with a warning that states `name`: `encoding` is often a larger one,
+/// such as windows-1252 for ISO-8859-1.
 fn decode_as<'a>(
     bytes: &'a [u8],
     encoding: &'static Encoding,
+    name: &str,
 ) -> Result<(Cow<'a, str>, Option<Warning>), ParseError> {
-    let actual = format!("encoding {:?}", encoding.name());
+    let actual = format!("encoding {name:?}");
     let text = encoding.decode_without_bom_handling_and_without_replacement(bytes);
     let text = text.ok_or_else(|| ParseError::Encoding {
         actual: format!("{actual} with bytes that it does not have"),

@@ -33,7 +33,8 @@ fn encodings_that_other_importers_read_are_read_with_a_warning() {
     let xml = with(X, "").replace("\"M\"", "\"K\u{f6}rper\"");
     let latin = xml.replace("UTF-8", "ISO-8859-1");
     let latin: Vec<u8> = latin.chars().map(|character| character as u8).collect();
-    assert_eq!(named(&latin).0, "K\u{f6}rper");
+    let declared = "encoding \"ISO-8859-1\"".to_owned();
+    assert_eq!(named(&latin), ("K\u{f6}rper".to_owned(), declared));
     // In windows-1252 the byte 0x80 is the euro sign.
     let windows = with(X, "").replace("UTF-8", "windows-1252").replace("\"M\"", "\"#\"");
     let windows: Vec<u8> =
