@@ -130,12 +130,26 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
+    /// Returns the names of the outputs that differ in two trajectories, three at most, as the end of a sentence.
+    fn differing(&self, first: &Trajectory, second: &Trajectory) -> String {
+        let differs =
+            |at: usize| first.iter().zip(second).any(|(one, other)| one.get(at) != other.get(at));
+        let names = outputs(self.description).enumerate().filter(|(at, _)| differs(*at));
+        let names: Vec<&str> = names.map(|(_, output)| output.name.as_str()).collect();
+        match names.len() {
+            0 => String::new(),
+            1..=3 => format!(": {}", names.join(", ")),
+            count => format!(": {} and {} more", names[..3].join(", "), count - 3),
+        }
+    }
+
     /// Adds a finding for two trajectories that differ, with the first step at which the outputs differ.
     fn report_difference(&mut self, first: &Trajectory, second: &Trajectory) {
         let step = first.iter().zip(second).position(|(one, other)| one != other);
         // If all common steps are equal, one of the trajectories is shorter.
         let step = step.unwrap_or(first.len().min(second.len()));
-        let what = format!("a second instance has other outputs, from step {step}");
+        let outputs = self.differing(first, second);
+        let what = format!("a second instance has other outputs, from step {step}{outputs}");
         let why = "A run cannot be repeated: statics, uninitialised memory or the clock are used.";
         self.findings.add(Warning, "fmi2DoStep", what, why, "2.1");
     }
@@ -468,9 +482,11 @@ impl<S: Slave> Trial<'_, S> {
         let second = self.steps(slave, STEPS, STEPS, false);
         let gap = second.as_ref().map_or(0.0, |second| distance(first, second));
         if gap > 0.0 {
+            let outputs = second.as_ref().map(|second| self.differing(first, second));
+            let outputs = outputs.unwrap_or_default();
             let what = format!(
                 "the outputs after the state was restored differ from those before, by {gap:.1e} \
-                 of their size"
+                 of their size{outputs}"
             );
             let severity = if gap > ROUNDING { Error } else { Warning };
             let why = "Masters that repeat a step, and optimisers, get wrong results.";
