@@ -18,7 +18,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context as _, anyhow};
+use anyhow::{Context as _, anyhow, bail};
 use fmu_description::ModelDescription;
 use fmu_description::package::Unpacked;
 use fmu_import::isolate::{self, IsolateError, Isolated, Package};
@@ -74,6 +74,13 @@ struct Report<'a> {
 
 /// Prints whether the FMU runs, and the findings; returns true if no finding is an error.
 pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
+    if options.fmu.is_dir() {
+        bail!(
+            "{}: expected the archive of an FMU, found a folder; `zip -r ../NAME.fmu .` in this folder \
+             makes one",
+            options.fmu.display()
+        );
+    }
     let unpacked = Unpacked::open_whole(&options.fmu)?;
     let (result, findings) = findings(options, &unpacked)?;
     let answer = Answer::new(result, &unpacked.description, &findings);

@@ -79,6 +79,8 @@ def test_a_file_that_cannot_be_read_as_an_fmu_ends_with_status_2(aso_ftc, fmu, t
     for path in [tmp_path / "Text.fmu", tmp_path / "Nowhere.fmu", fmu({"modelDescription.xml": "<a"})]:
         done = aso_ftc("check", path)
         assert done.returncode == 2 and done.stderr.startswith("error: "), done
+    done = aso_ftc("check", tmp_path)
+    assert done.returncode == 2 and "found a folder" in done.stderr, done
 
 
 def mutated(xml, seed):
