@@ -114,13 +114,23 @@ def test_units_remove_a_peak_that_comes_from_signals_without_units(aso_ftc, tmp_
     assert report["verdict"]["level"] == "green" and remedy["change"].endswith(f", {output['judged']:.5g}")
 
 
-def test_the_lines_that_follow_a_reason_of_the_verdict_give_the_stated_peaks(aso_ftc, tmp_path):
-    _, report = design_and_report(aso_ftc, tmp_path, REMEDIED)
+# A rotor that moves a mass on a spring (TORA): C.-J. Wan, D. S. Bernstein and V. T. Coppola, Nonlinear Dynamics 10 (1996).
+# The command chooses both bandwidths.
+ROTOR = """A = [[0, 1, 0, 0], [-1.0416667, 0, 0, 0], [0, 0, 0, 1], [0.2083333, 0, 0, 0]]
+B = [[0], [-0.2083333], [0], [1.0416667]]
+C = [[1, 0, 0, 0], [0, 0, 1, 0]]
+actuator_faults = "all"
+"""
+
+
+@pytest.mark.parametrize("plant", [REMEDIED, ROTOR], ids=["eigenvalues", "chosen bandwidths"])
+def test_the_lines_that_follow_a_reason_of_the_verdict_give_the_stated_peaks(aso_ftc, tmp_path, plant):
+    _, report = design_and_report(aso_ftc, tmp_path, plant)
     verdict = report["verdict"]
     assert verdict["level"] == "amber" and [one["reason"] for one in verdict["remedies"]] == verdict["reasons"]
     for remedy in verdict["remedies"]:
         names = {line.split(" = ")[0] for line in remedy["lines"]}
-        changed = [line for line in REMEDIED.splitlines() if line.split(" = ")[0] not in names]
+        changed = [line for line in plant.splitlines() if line.split(" = ")[0] not in names]
         _, other = design_and_report(aso_ftc, tmp_path, "\n".join([*remedy["lines"], *changed]))
         peaks = [point["judged"] for point in other["robustness"]["points"]]
         for peak in peaks:

@@ -208,6 +208,16 @@ fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> O
     Some(Scaled { requirement, line, words })
 }
 
+/// The line of the plant file for a bandwidth of the loop `name` that the command has chosen; None if it is stated.
+fn chosen(name: &str, requirement: &Requirement) -> Option<String> {
+    match requirement {
+        Requirement::Bandwidth(Bandwidth { rate: Some(rate), is_stated: false }) => {
+            Some(format!("{name}.bandwidth = {}", rounded(*rate)))
+        }
+        _ => None,
+    }
+}
+
 impl Variant {
     /// Designs the variant and examines its loop; None if there is no design, or its loop is not stable.
     fn trial(self, file: &PlantFile<'_>, varies: bool) -> Option<Trial> {
@@ -225,8 +235,14 @@ impl Variant {
         #[expect(clippy::cast_precision_loss, reason = "one or two loops")]
         let distance = factor.ln().abs() * parts.len() as f64;
         let words: Vec<_> = parts.iter().map(|part| part.words.as_str()).collect();
+        // Beside a stated bandwidth the command would choose the other one anew.
+        let kept = [
+            observer.is_none().then(|| chosen("observer", &file.observer.requirement)),
+            feedback.is_none().then(|| chosen("feedback", &file.feedback.requirement)),
+        ];
+        let kept = kept.into_iter().flatten().flatten();
         Some(Trial {
-            lines: parts.iter().map(|part| part.line.clone()).collect(),
+            lines: parts.iter().map(|part| part.line.clone()).chain(kept).collect(),
             words: words.join(" and "),
             judged,
             distance,
