@@ -4,7 +4,7 @@ mod interrupt;
 mod progress;
 mod terminal;
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::iter;
 use std::path::{Path, PathBuf};
@@ -149,6 +149,12 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     if options.init {
         return init(options).map(|()| true);
     }
+    let extension = options.plant.extension().and_then(OsStr::to_str).unwrap_or_default();
+    anyhow::ensure!(
+        !matches!(extension.to_ascii_lowercase().as_str(), "fmu" | "mat" | "csv" | "parquet"),
+        "{0} is no plant file; `aso-ftc design --init {0}` writes one for it",
+        options.plant.display()
+    );
     if options.compare {
         return compare(options).map(|()| true);
     }

@@ -99,6 +99,13 @@ WRONG = [
 ]
 
 
+@pytest.mark.parametrize("name", ["motor.fmu", "motor.MAT", "motor.csv"])
+def test_a_plant_in_place_of_a_plant_file_is_refused_with_the_option_that_takes_it(aso_ftc, tmp_path, name):
+    (tmp_path / name).write_bytes(b"PK\x03\xff")
+    done = aso_ftc("design", tmp_path / name, "--out", tmp_path / "design.toml")
+    assert done.returncode == 2 and f"`aso-ftc design --init {tmp_path / name}`" in done.stderr, done
+
+
 @pytest.mark.parametrize(("old", "new", "expected"), WRONG, ids=lambda text: text[:40])
 def test_a_plant_file_that_cannot_be_designed_is_refused_at_the_faulty_entry(refusal, old, new, expected):
     assert old in MASS
