@@ -25,11 +25,14 @@ pub(super) struct Log {
 }
 
 /// Whether the file is a table of signals over time, by its `ending`: Parquet, a MAT file with results of Dymola or
-/// OpenModelica, or CSV whose column of the time is called `time` or `t`.
+/// OpenModelica, or CSV whose column of the time is called `time` or `t`, also with a unit: `time [ms]`, `time (ms)`.
 pub(in crate::init) fn is_log(path: &Path, ending: &str) -> bool {
     let is_named = |table: Table| {
         let name = named(&table.columns()[table.time()].name).name;
-        ["time", "t"].iter().any(|time| name.eq_ignore_ascii_case(time))
+        let mut words = words(&name);
+        let first = words.next().unwrap_or_default();
+        let is_time = ["time", "t"].iter().any(|time| first.eq_ignore_ascii_case(time));
+        is_time && words.all(|word| time_unit(word).is_some())
     };
     match ending {
         "parquet" => true,
@@ -132,10 +135,13 @@ impl Columns<'_> {
         Signal { unit: column.unit.clone().or(name.unit), ..name }
     }
 
-    /// Returns the length in s of the unit of the times, 1 without a stated unit; an error for a unit of another
-    /// quantity.
+    /// Returns the length in s of the unit of the times, which the last word of the name may state: `time (ms)`,
+    /// `time_ms`; 1 without a stated unit; an error for a unit of another quantity.
     fn seconds(&self) -> Result<f64, String> {
-        let Some(text) = self.name(self.0.time()).unit else { return Ok(1.0) };
+        let Signal { name, unit, .. } = self.name(self.0.time());
+        let Some(text) = unit else {
+            return Ok(words(&name).next_back().and_then(time_unit).unwrap_or(1.0));
+        };
         let refusal = || format!("the time is in {text}, expected s, ms, min, h or d");
         seconds(&text).ok_or_else(refusal)
     }
@@ -228,6 +234,17 @@ fn seconds(unit: &str) -> Option<f64> {
     Some(factor)
 }
 
+/// Returns the words of a name, `time` and `ms` of `time (ms)`.
+fn words(name: &str) -> impl DoubleEndedIterator<Item = &str> {
+    name.split(|sign: char| !sign.is_alphanumeric()).filter(|word| !word.is_empty())
+}
+
+/// Returns the length in s of the unit of time that is a word of a name; None for other words, such as Ts, a sample time
+/// or 1e12 s.
+fn time_unit(word: &str) -> Option<f64> {
+    seconds(word).filter(|length| (1e-9..=86_400.0).contains(length))
+}
+
 /// Returns the sample time; an error if times do not increase, or not by equal steps.
 fn period(times: &[f64]) -> Result<f64, String> {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -255,6 +272,25 @@ fn period(times: &[f64]) -> Result<f64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_name_of_a_column_states_the_unit_of_its_times() {
+        let unit = |name: &str| words(name).next_back().and_then(time_unit);
+        for (name, expected) in [
+            ("time (ms)", Some(0.001)),
+            ("time_ms", Some(0.001)),
+            ("ms", Some(0.001)),
+            ("Time (s)", Some(1.0)),
+            ("t/h", Some(3600.0)),
+            ("time", None),
+            ("t", None),
+            ("Ts", None),
+            ("timestamp", None),
+            ("", None),
+        ] {
+            assert_eq!(unit(name), expected, "{name}");
+        }
+    }
 
     /// Measuring systems write seconds in several ways, of which FMI knows one.
     #[test]
