@@ -4,6 +4,7 @@ import json
 import tomllib
 import zipfile
 
+import fmpy
 import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
@@ -361,6 +362,16 @@ REFUSALS = {
         "it has no `delay` and no `structure`",
     ),
 }
+
+
+def test_the_description_states_the_noise_that_the_filter_assumes(tanks):
+    """With a bandwidth, the noise of the file is the geometric mean of what the filter assumes."""
+    _, v, _ = covariances(tanks)
+    stated = fmpy.read_model_description(str(tanks)).description.split("assumed standard deviations: ")[1]
+    names, values, units = zip(*(signal.split() for signal in stated.split(", ")), strict=True)
+    assert names == ("y_1", "y_2", "y_3") and set(units) == {"m"}
+    np.testing.assert_allclose(np.array(values, float), np.sqrt(np.diag(v)), rtol=1e-4)
+    np.testing.assert_allclose(np.prod(np.diag(v)) ** (1 / 6), 0.002, rtol=1e-6)
 
 
 @pytest.mark.parametrize("entry", REFUSALS)

@@ -9,7 +9,8 @@ use nalgebra::DMatrix;
 
 use crate::design_file::as_stated;
 use crate::matrix::matrix;
-use crate::plant::linear::request;
+use crate::plant::linear::{LinearPlant, request};
+use crate::report::number::rounded;
 use crate::solve::designed::Designed;
 use crate::solve::gain::Noise;
 use crate::solve::solution::Solution;
@@ -102,19 +103,19 @@ pub(crate) fn kalman_design(
     let states = signals(&linear.states);
     let is_state = |name: &String| states.iter().any(|state| state.name == *name);
     let settings = fmu.operating_point.iter().filter(|(name, _)| !is_state(name));
-    let names = joined(linear.faults.iter().map(|fault| fault.name.as_str()));
     let fastest =
         eigenvalues(&linear.a).map_or(0.0, |all| all.iter().map(|p| p.norm()).fold(0.0, f64::max));
     let steps = (period * fastest / RESOLUTION).ceil();
     #[expect(clippy::cast_possible_truncation, reason = "from 1 to MOST_STEPS")]
     let integration_steps = steps.clamp(1.0, MOST_STEPS) as i32;
+    let covariance = &noise.measurements * scale;
     Ok(KalmanDesign {
-        description: format!("Kalman filter that estimates the states of its plant and {names}"),
+        description: description(linear, &covariance),
         sample_time: period,
         integration_steps,
         stop_time,
         w: part(&noise.process),
-        v: matrix(&(&noise.measurements * scale)),
+        v: matrix(&covariance),
         p: part(&noise.covariance),
         settings: settings.cloned().collect(),
         commands: signals(&linear.actuators),
@@ -122,6 +123,21 @@ pub(crate) fn kalman_design(
         faults: faults.collect(),
         states,
     })
+}
+
+/// Returns the description of the filter of the plant `linear`, with the noise of the measurements that it assumes.
+fn description(linear: &LinearPlant, covariance: &DMatrix<f64>) -> String {
+    let faults = joined(linear.faults.iter().map(|fault| fault.name.as_str()));
+    let variances = covariance.diagonal();
+    let deviations = linear.measurements.iter().zip(&variances).map(|(signal, variance)| {
+        let unit = signal.unit.as_deref().map(|unit| format!(" {unit}")).unwrap_or_default();
+        format!("{} {}{unit}", signal.name, rounded(variance.sqrt()))
+    });
+    let deviations: Vec<_> = deviations.collect();
+    format!(
+        "Kalman filter that estimates the states of its plant and {faults}; assumed standard deviations: {}",
+        deviations.join(", ")
+    )
 }
 
 /// Returns the factor of the covariances with which the variances of the measurements agree with the variances in the
