@@ -263,6 +263,8 @@ def test_the_heat_map_marks_faults_whose_run_did_not_finish(tmp_path):
         ("stuck: a.y", "from 1 s"): 4.0,
         ("stuck: b.y", "from 1 s"): "lost",
     }
+    # "stuck" and the run without a fault have no size.
+    assert "4 of 7 runs, of which 2 fail, have no value of one of them" in document.text
     assert "5 faults" not in document.text and "4 faults in 6 runs" in document.text and "(none)" in document.text
 
 

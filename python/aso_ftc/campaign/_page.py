@@ -220,10 +220,13 @@ def _border(outcome: Outcome, measure: str) -> dict[str, Any] | None:
         return None
     frame = outcome.read(names)
     x, y = (frame[name].to_numpy(dtype=np.float64) for name in names)
-    fitted = border(x, y, outcome.failed(measure))
+    failed = outcome.failed(measure)
+    fitted = border(x, y, failed)
+    missing = ~(np.isfinite(x) & np.isfinite(y))
     return {
         "names": names,
         "measure": measure,
+        "missing": [int(missing.sum()), int(failed[missing].sum())],
         "surface": None
         if fitted is None
         else {
@@ -240,6 +243,9 @@ def _border_text(outcome: Outcome, fitted: Mapping[str, Any] | None) -> str:
         return ""
     a, b = fitted["names"]
     text = f"The runs over the two parameters with the strongest influence on {fitted['measure']}, {a} and {b}."
+    missing, failures = fitted["missing"]
+    if missing:
+        text += f" {missing:,} of {len(outcome):,} runs, of which {failures:,} fail, have no value of one of them and are missing here."
     if fitted["surface"] is None:
         text += " Too few runs fail, or too few pass, to fit a surface."
     else:
