@@ -37,11 +37,17 @@ impl<M: Model> Instance<M> {
     }
 
     /// Handles an event, for `fmi2NewDiscreteStates` and `fmi3UpdateDiscreteStates`. Logs the reason if the model ends
-    /// the simulation.
+    /// the simulation. An error if the next event has no time.
     pub(crate) fn update_discrete_states(&mut self) -> Result<Event, Failure> {
         let core = &mut self.core;
         core.check()?;
         let event = core.model.event(core.time)?;
+        if event.next_event_time.is_some_and(f64::is_nan) {
+            let time = core.time;
+            return Err(Failure::Error(format!(
+                "the event at {time} s states the next event time NaN s, expected a later one"
+            )));
+        }
         (core.next_event, core.stale) = (event.next_event_time, true);
         if let Some(reason) = &event.terminate_simulation {
             let message = format!("the simulation ends at t = {} s: {reason}", self.core.time);

@@ -34,12 +34,15 @@ struct Sampled {
     /// The simulation ends after this number of samples
     #[fmu(parameter, start = 1000)]
     last: i32,
+    /// Time between samples in s
+    #[fmu(skip, start = 0.3)]
+    interval: f64,
     log: Log,
 }
 
 impl Sampled {
     fn next(&self) -> f64 {
-        0.3 * f64::from(self.samples)
+        self.interval * f64::from(self.samples)
     }
 }
 
@@ -73,7 +76,11 @@ impl Model for Sampled {
 }
 
 fn initialized() -> Instance<Sampled> {
-    let (kind, none) = (InterfaceType::CoSimulation, Path::new(""));
+    initialized_for(InterfaceType::CoSimulation)
+}
+
+fn initialized_for(kind: InterfaceType) -> Instance<Sampled> {
+    let none = Path::new("");
     let guid = crate::describe::<Sampled>(none).unwrap().guid;
     let mut instance = Instance::new(kind, none, &guid, Callbacks::silent()).unwrap();
     let done = [
@@ -142,6 +149,18 @@ fn the_model_may_end_the_simulation_at_an_event() {
     assert_eq!(step(&mut instance, 0.0, 1.0), Status::Discard);
     assert!(instance.is_terminated());
     assert!((instance.last_successful_time() - 0.6).abs() < 1e-15);
+}
+
+#[test]
+fn a_next_event_time_that_is_nan_is_an_error_in_both_interfaces() {
+    let mut instance = initialized();
+    instance.core.model.interval = f64::NAN;
+    assert_eq!(step(&mut instance, 0.0, 0.1), Status::Error);
+    let mut instance = initialized_for(InterfaceType::ModelExchange);
+    instance.core.model.interval = f64::NAN;
+    let status =
+        instance.call(Function::NewDiscreteStates, |i| i.new_discrete_states().map(|_| ()));
+    assert_eq!(status, Status::Error);
 }
 
 #[test]
