@@ -136,6 +136,18 @@ mod tests {
     }
 
     #[test]
+    fn a_clocked_output_depends_on_its_input_clock() {
+        let description = describe_3::<Vector>(Path::new("")).unwrap();
+        let rows = description.structure.outputs.iter();
+        let knowns: Vec<_> = rows.map(|row| row.dependencies.clone().unwrap()).collect();
+        let clock = description.variable("tick[2]").unwrap();
+        assert_eq!(knowns.len(), 1);
+        let knowns: Vec<_> =
+            knowns[0].iter().map(|&known| description.at(known).unwrap()).collect();
+        assert_eq!(knowns, [clock]);
+    }
+
+    #[test]
     fn a_description_of_fmi_2_has_neither_clocks_nor_their_aliases() {
         let description = describe::<Gain>(Path::new("")).unwrap();
         let names = description.variables.iter().map(|variable| variable.name.as_str());

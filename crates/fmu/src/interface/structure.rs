@@ -89,7 +89,8 @@ fn resolve_alias(variables: &Variables, position: usize) -> Result<Option<usize>
 }
 
 /// Returns the row of an output or derivative. A variable that is a state, or an alias of one, depends on this state,
-/// `own_state`. The first of several dependencies on one known counts.
+/// `own_state`; a clocked variable depends on those of its clocks that are inputs (FMI 3.0.2, section 2.4.8). The first
+/// of several dependencies on one known counts.
 fn dependency_row(
     variables: &Variables,
     position: usize,
@@ -100,6 +101,13 @@ fn dependency_row(
     row.extend(own_state.map(|state| (index(state), DependencyKind::Constant)));
     for (name, kind) in &variable.direct {
         row.push((known(variables, variable, name)?, *kind));
+    }
+    for name in &variable.clocks {
+        let is_known =
+            |clock: &Declaration| clock.name == *name && clock.causality == Causality::Input;
+        if let Some(clock) = variables.iter().position(is_known) {
+            row.push((index(clock), DependencyKind::Dependent));
+        }
     }
     row.sort_by_key(|(known, _)| *known);
     row.dedup_by_key(|(known, _)| *known);
