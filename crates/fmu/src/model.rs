@@ -204,8 +204,9 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// Sets the fields of the triggered clocks that tick in the event at `time` (in s), and that are no inputs
     /// ([`Variable::triggered_clock`]). The fields are false before and after the event.
     ///
-    /// Called when event mode starts, when the importer has set its clocks, and when discrete states are
-    /// updated again, each time before [`Model::event`]. The default implementation does nothing.
+    /// Called when event mode starts, when the importer has set clocks or variables, and when discrete states are updated
+    /// again, each time before [`Model::event`]. The function therefore sets the fields to true or false. The default
+    /// implementation does nothing.
     fn tick(&mut self, time: f64) {
         let _ = time;
     }

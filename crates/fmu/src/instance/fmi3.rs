@@ -231,7 +231,8 @@ impl<M: Model> Instance<M> {
         self.located_in_arrays(kind, references, count, body)
     }
 
-    /// [`Instance::located`] for a function that sets; an error for a calculated variable.
+    /// [`Instance::located`] for a function that sets; an error for a calculated variable. In event mode the model ticks
+    /// its clocks again, which may depend on the values.
     pub(crate) fn set_located(
         &mut self,
         kind: NativeType,
@@ -240,7 +241,11 @@ impl<M: Model> Instance<M> {
         set: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         self.session()?.table.check_settable(references)?;
-        self.located(kind, references, count, set)
+        self.located(kind, references, count, set)?;
+        if self.core.state == State::EventMode {
+            self.tick();
+        }
+        Ok(())
     }
 
     /// [`Instance::located`] for a function that reads. While a clock ticks, in a model with clocked variables, `body`

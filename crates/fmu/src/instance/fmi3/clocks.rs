@@ -8,8 +8,8 @@ use fmu_description::abi3::{IntervalQualifier, fmi3Clock};
 use fmu_description::{Causality, IntervalVariability as Variability};
 
 impl<M: Model> Instance<M> {
-    /// Lets the model tick its clocks: when event mode starts, after a clock was set, and before discrete states are
-    /// updated again.
+    /// Lets the model tick its clocks: when event mode starts, after a clock or a variable was set, and before discrete
+    /// states are updated again.
     pub(super) fn tick(&mut self) {
         if !bool::slots(&self.interface.typed).is_empty() {
             self.core.model.tick(self.core.time);

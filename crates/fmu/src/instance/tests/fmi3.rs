@@ -234,6 +234,57 @@ fn a_step_returns_early_at_an_event_that_the_importer_handles() {
     assert!(!step.early_return && step.last_successful_time == time + 0.5, "{step:?}");
 }
 
+/// A clock that ticks while an input is above 1.
+#[derive(Clone, Serialize, Deserialize)]
+struct Alarm {
+    u: f64,
+    high: bool,
+}
+
+impl Model for Alarm {
+    const IDENTIFIER: &'static str = "Alarm";
+
+    fn about(&self) -> About {
+        About::default()
+    }
+
+    fn new(_: &Path) -> Result<Self, Failure> {
+        Ok(Self { u: 0.0, high: false })
+    }
+
+    fn variables(&self) -> Vec<Variable<Self>> {
+        vec![
+            Variable::real("u", "input", |model: &mut Self| &mut model.u).input(),
+            Variable::triggered_clock("high", "u > 1", |model: &mut Self| &mut model.high)
+                .output(&["u"]),
+        ]
+    }
+
+    fn tick(&mut self, _: f64) {
+        self.high = self.u > 1.0;
+    }
+
+    fn model_exchange(&self) -> Option<ModelExchange> {
+        Some(ModelExchange::default())
+    }
+}
+
+#[test]
+fn an_output_clock_follows_the_inputs_that_are_set_in_the_same_event() {
+    let mut instance = instantiate::<Alarm>(InterfaceType::ModelExchange, false, false).unwrap();
+    instance.call(Function::EnterInitializationMode, Instance::enter_initialization_mode);
+    instance.call(Function::ExitInitializationMode, Instance::exit_initialization_mode_3);
+    let u = describe_3::<Alarm>(Path::new("")).unwrap().variable("u").unwrap().value_reference;
+    for (value, expected) in [(2.0, 1), (0.0, 0), (3.0, 1)] {
+        let status = instance.call(Function::SetFloat64, |i| {
+            i.set_located(NativeType::Float64, &[u], 1, |i, places| i.set_float64(places, &[value]))
+        });
+        let mut ticks = [0];
+        instance.get_clock(&[0], room_of(&mut ticks));
+        assert_eq!((status, ticks[0]), (Status::OK, expected), "{value}");
+    }
+}
+
 #[test]
 fn a_step_without_event_mode_handles_its_events_and_is_complete() {
     let mut instance = initialized(InterfaceType::CoSimulation, false);
