@@ -169,7 +169,11 @@ impl Unpacked {
             let mut actual =
                 if libraries.is_empty() { "no library".to_owned() } else { libraries.join(", ") };
             if self.has_sources() {
-                actual.push_str("; its source code is in sources/, which --compile builds");
+                actual.push_str(if self.states_build() {
+                    "; its source code is in sources/, which --compile builds"
+                } else {
+                    "; its source code is in sources/, but the FMU does not state how it is built"
+                });
             }
             PackageError::Missing {
                 expected: format!("the library {}", expected.join(" or ")),
@@ -217,6 +221,18 @@ impl Unpacked {
     pub fn has_sources(&self) -> bool {
         self.names.iter().any(|name| name.starts_with("sources/") && !name.ends_with('/'))
             || has_file(&self.folder().join("sources"))
+    }
+
+    /// Whether the FMU states how its source code is built: `buildDescription.xml`, or in FMI 2.0 an element
+    /// `SourceFiles`.
+    fn states_build(&self) -> bool {
+        const FILE: &str = "sources/buildDescription.xml";
+        let description = &self.description;
+        let simulation = description.co_simulation.as_ref().map(|flags| &flags.source_files);
+        let exchange = description.model_exchange.as_ref().map(|flags| &flags.source_files);
+        self.names.iter().any(|name| name == FILE)
+            || self.folder().join(FILE).is_file()
+            || simulation.into_iter().chain(exchange).any(|files| !files.is_empty())
     }
 
     /// The paths of the files in the platform folders of `binaries`, whose case is ignored; sorted, at most 20.

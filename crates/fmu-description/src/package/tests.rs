@@ -314,6 +314,26 @@ fn a_folder_sources_with_empty_folders_is_no_source_code() {
 }
 
 #[test]
+fn the_option_that_builds_source_code_is_proposed_if_the_fmu_states_how() {
+    let code = ("sources/a.c", "", 0o100_644);
+    let build = ("sources/buildDescription.xml", "", 0o100_644);
+    let listed = XML
+        .replace("\"M\"/>", "\"M\"><SourceFiles><File name=\"a.c\"/></SourceFiles></CoSimulation>");
+    for (description, entries, proposed) in [
+        (XML, &[code][..], false),
+        (XML, &[code, build][..], true),
+        (listed.as_str(), &[code][..], true),
+    ] {
+        let entries = [&[(DESCRIPTION, description, 0o100_644)][..], entries].concat();
+        let error = opened(&raw::archive(&entries)).unwrap().library("M").unwrap_err().to_string();
+        assert!(
+            error.contains("source code") && error.contains("--compile") == proposed,
+            "{error}"
+        );
+    }
+}
+
+#[test]
 fn files_that_are_no_fmus_are_refused_with_the_reason() {
     let absent = Unpacked::open(Path::new("/nowhere/M.fmu")).unwrap_err();
     assert!(matches!(absent, PackageError::File { action: "open", .. }), "{absent}");
