@@ -123,7 +123,13 @@ impl EntryConverter<'_> {
             let value = unit.relative(finite("value", bias.value)?);
             Fault::Bias(self.whole("value", value)?)
         });
-        of!(gain => Fault::Gain(finite("factor", gain.factor)?));
+        of!(gain => {
+            if unit.offset != 0.0 {
+                let expected = "no unit with an offset, as the factor acts in the unit of the input";
+                return Err(Reason::Members { what: "gain", expected });
+            }
+            Fault::Gain(finite("factor", gain.factor)?)
+        });
         of!(drift => Fault::Drift(unit.relative(finite("rate", drift.rate)?)));
         of!(stuck => Fault::Stuck(self.value(stuck.value.as_ref(), unit)?));
         of!(dropout => self.dropout(dropout, unit)?);

@@ -232,6 +232,14 @@ fn faults_that_say_too_little_or_too_much_are_refused() {
     ] {
         expect_of_fault("ctrl.force", body, message);
     }
+    // Twice 20 degC is 40 degC, but twice the same temperature in K is 313 degC.
+    let signal = signal("variable = \"plant.temperature\", constant = 20");
+    let gain = fault("connection = \"plant.temperature\", unit = \"K\", gain = { factor = 2 }");
+    expect(
+        &format!("{signal}\n{gain}"),
+        "scenario.fault[1]: gain: expected no unit with an offset, as the factor acts in the unit of \
+         the input",
+    );
 }
 
 #[test]
