@@ -128,13 +128,13 @@ pub(crate) struct Options {
     /// The time that certificates and bounds of large plants may take before the rest of them is left out;
     /// 0 leaves all out.
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = seconds)]
-    #[arg(help_heading = "Computation")]
+    #[arg(allow_negative_numbers = true, help_heading = "Computation")]
     certificate_time: Duration,
     /// Time for gains in s
     ///
     /// The time that the search for gains by linear matrix inequalities may take before the design is refused.
     #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = seconds)]
-    #[arg(help_heading = "Computation")]
+    #[arg(allow_negative_numbers = true, help_heading = "Computation")]
     gain_time: Duration,
     /// Load a shared library first
     ///
