@@ -513,6 +513,10 @@ def test_names_become_different_identifiers_and_the_header_lists_them(aso_ftc, t
     code.compiled("-O2"), code.crate()
 
 
+def test_a_signal_may_have_the_name_of_the_header(aso_ftc, tmp_path):
+    Built(aso_ftc, masses("current", "true").replace('"Q_1"', '"Q_H"'), tmp_path, name="q").compiled("-O2")
+
+
 def test_a_continuous_design_has_no_code_and_float_needs_code(aso_ftc, tmp_path):
     plant = ROOT / "examples" / "plants" / "quadruple-tank.toml"
     done = aso_ftc("design", plant, "--out", tmp_path / "d.toml", "--c-code", tmp_path / "c")

@@ -19,8 +19,8 @@ impl Source<'_> {
         }
         lines.push(format!(
             " */
-#ifndef {capital}_H
-#define {capital}_H
+#ifndef {capital}_H_
+#define {capital}_H_
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -91,7 +91,7 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
 }}
 #endif
 
-#endif /* {capital}_H */",
+#endif /* {capital}_H_ */",
             self.signature()
         ));
         lines.text()
