@@ -108,13 +108,17 @@ def pair(value, scipy):
     return f"{value:.3g} / {scipy:.3g}" if scipy is not None else f"{value:.3g} / -"
 
 
+def stable(report):
+    part = report["robustness"]["tolerance"]["stable"]
+    return "-" if part is None else f"{100 * part:.0f} %"
+
+
 def row(file, sampled):
     report, design, scipy = compared(file, sampled)
     values = [pair(value, getattr(scipy, name, None)) for name, value in vars(design).items()]
     disks = [point["together"]["alpha"] for point in report["robustness"]["points"]]
-    stable = 100 * report["robustness"]["tolerance"]["stable"]
     name = file.stem + (f", {SAMPLE_TIMES.get(file.stem, SAMPLE_TIME)} s" if sampled else "")
-    return [name, *values, f"{min(disks):.2g}", f"{stable:.0f} %", report["verdict"]["level"]]
+    return [name, *values, f"{min(disks):.2g}", stable(report), report["verdict"]["level"]]
 
 
 def chosen(file, sampled):
@@ -124,9 +128,8 @@ def chosen(file, sampled):
     methods = [report[part]["method"] for part in ("feedback", "observer")]
     rates = [re.search(r"bandwidth of (\S+)", method)[1] for method in methods]
     peaks = [f"{point['judged']:.3g}" for point in report["robustness"]["points"]]
-    stable = 100 * report["robustness"]["tolerance"]["stable"]
     name = file.stem + (f", {sample_time} s" if sampled else "")
-    return [name, *rates, *peaks, f"{stable:.0f} %", report["verdict"]["level"]]
+    return [name, *rates, *peaks, stable(report), report["verdict"]["level"]]
 
 
 def table(heads, rows):
