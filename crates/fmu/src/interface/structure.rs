@@ -105,7 +105,7 @@ fn dependency_row(
     for name in &variable.clocks {
         let is_known =
             |clock: &Declaration| clock.name == *name && clock.causality == Causality::Input;
-        if let Some(clock) = variables.iter().position(is_known) {
+        if let Some(clock) = variables.declarations.iter().position(is_known) {
             row.push((index(clock), DependencyKind::Dependent));
         }
     }
