@@ -309,9 +309,10 @@ impl Reason {
             (None, _) if !is_complete => return None,
             (None, Some(trial)) => {
                 let change = format!(
-                    "none of {} other stable designs, from {SLOWEST} to {FASTEST} times as fast, meets the limit; \
-                     with {}, the peak of S is {}{untried}",
+                    "none of {} other stable designs, from {SLOWEST} to {FASTEST} times as fast, has a peak of \
+                     at most {} without being worse elsewhere; with {}, the peak of S is {}{untried}",
                     trials.len(),
+                    rounded(limits.amber),
                     trial.words,
                     trial.peaks()
                 );
