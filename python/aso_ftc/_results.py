@@ -189,7 +189,7 @@ class Results(Mapping[str, "NDArray[Any]"]):
         package = _package("pandas", "to_pandas()")
         columns = {name: self[name] for name in self.names[1:]}
         index = package.Index(self.time, name="time")
-        frame: pandas.DataFrame = package.DataFrame(columns, index=index, copy=False)
+        frame: pandas.DataFrame = package.DataFrame(columns, index=index)
         frame.attrs["units"] = {name: unit for name, unit in self.units.items() if unit}
         return frame
 

@@ -58,6 +58,9 @@ def test_pandas_polars_and_xarray_have_the_same_values(results):
     if pytest.importorskip("pandas"):
         frame = results.to_pandas()
         assert frame.index.name == "time" and np.array_equal(frame.index, results.time)
+        changed = results.to_pandas()
+        changed.loc[0.0, results.names[1]] = 1.0
+        assert changed.iloc[0, 0] == 1.0
         frames.append(lambda name: frame[name].to_numpy())
     if pytest.importorskip("polars"):
         other = results.to_polars()
