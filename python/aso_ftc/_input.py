@@ -84,6 +84,9 @@ def _columns(data: Any) -> tuple[dict[str, Any], dict[str, Any]]:
 
     if isinstance(data, Results):
         return dict(data), data.units
+    if hasattr(data, "to_frame"):
+        # A series of pandas or polars.
+        data = data.to_frame()
     if isinstance(data, Mapping) and not hasattr(data, "data_vars"):
         return {str(name): _unmasked(column) for name, column in data.items()}, {}
     if hasattr(data, "data_vars"):

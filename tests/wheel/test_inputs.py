@@ -25,6 +25,7 @@ def first():
 FORMS = {
     "results": lambda results: results,
     "pandas": lambda results: results.to_pandas(),
+    "a series of pandas": lambda results: results.to_pandas()["u"],
     "a column of pandas": lambda results: results.to_pandas().reset_index(),
     "polars": lambda results: results.to_polars(),
     "xarray": lambda results: results.to_xarray(),
