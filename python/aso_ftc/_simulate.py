@@ -91,8 +91,13 @@ def simulate(
     try:
         return system._run(_changes(**changes), **run_options, prefix=f"{name}.")
     except ConfigurationError as error:
-        # The signals of the scenario are the columns of the input.
+        # The signals of the scenario are the columns of the input, and its tables are no files.
+        def at(match: re.Match[str]) -> str:
+            _, moments, _ = run_options["tables"][int(match[2])]
+            return f" at t = {memoryview(moments).cast('d')[int(match[1]) - 1]:.12g} s"
+
         sentence = re.sub(r"^scenario\.signal\[\d+\]", "input", str(error))
+        sentence = re.sub(r" in row (\d+) of .*input-(\d+)(?=: )", at, sentence)
         raise ConfigurationError(sentence, error.kind, error.fields) from error.__cause__
 
 

@@ -101,6 +101,7 @@ def test_units_of_a_table_are_converted(first):
         ({"time": TIME, "U": FORCE}, "no variable 'U'; similar: u"),
         ({"time": TIME, "u": FORCE, "x_p": FORCE}, r"found x_p \(continuous output\)"),
         ({"time": TIME, "u": np.where(TIME > 0.5, np.nan, FORCE)}, r"u is nan in row 51, t = 0.51 s"),
+        ({"time": TIME, "u": np.where(TIME > 0.5, np.inf, FORCE)}, r"u = inf at t = 0.51 s: expected a finite"),
         ({"time": TIME[::-1], "u": FORCE}, "time is 0.99 s in row 1 after 1 s, expected ascending"),
         ({"time": np.append(TIME[:-1], np.inf), "u": FORCE}, "time is inf in row 100"),
         ({"time": ["a"], "u": [1.0]}, "time is no number"),
