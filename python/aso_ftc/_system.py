@@ -537,10 +537,13 @@ class Simulation:
         return numpy.array(self._stepper.get(list(array.elements))).reshape(array.shape)
 
     def get(self, names: Iterable[str]) -> list[Any]:
-        """Return the values of several variables."""
+        """Return the values of several variables, of an array of FMI 3.0 an array."""
         if isinstance(names, str):
             raise TypeError(f"expected a list of names, found the text {names!r}")
-        return self._stepper.get(list(names))
+        listed = list(names)
+        if not self._arrays.keys().isdisjoint(listed):
+            return [self[name] for name in listed]
+        return self._stepper.get(listed)
 
     def set(self, name: str, value: object) -> None:
         """Set an input without a connection or a tunable parameter, from the next step on."""

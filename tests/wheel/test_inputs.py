@@ -161,6 +161,7 @@ def test_arrays_go_in_and_come_out_in_their_dimensions(packed):
         steps.set("s.u", u)
         steps.step()
         assert np.array_equal(steps["s.u"], u)
+        assert [np.shape(value) for value in steps.get(["s.B", "s.n"])] == [(3, 2), ()]
 
 
 def test_binaries_are_bytes_and_clocks_are_booleans(packed, tmp_path):
