@@ -74,6 +74,7 @@ def simulate(
         # Of the system, so that no function loads the FMU into this process.
         system.isolation["isolate"] = isolate
     values = None if start_values is None else _start_values(system, name, start_values)
+    system._check_values(values)
     variables = _variables(system, name, values)
     changes: dict[str, Any] = {
         "start_values": values,

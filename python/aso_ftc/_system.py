@@ -48,6 +48,7 @@ _FMPY = {
     "fmu_instance": "System.simulation()",
     "fmu_state": "Simulation.save() and restore()",
 }
+_BYTES = (bytes, bytearray)
 # Tables of a system.toml that a System shows as attributes.
 _TABLES = ("algorithm", "experiment", "results", "isolation", "scenario")
 
@@ -320,6 +321,27 @@ class System:
         self._cache = copy.deepcopy(config), dict(self._slaves), study
         return study
 
+    def _check_values(self, values: Mapping[str, Any] | None, isolate: bool | None = None) -> None:
+        """Refuse a matrix of another shape, whose rows would be mixed, and bytes for a variable that is no Binary."""
+        present = {**self.start_values, **({} if values is None else values)}
+        parts = {name: dict(_elements(value)) for name, value in present.items()}
+        shapes = {name: tuple(map(max, zip(*elements))) for name, elements in parts.items()}
+        matrices = [name for name, shape in shapes.items() if len(_long(shape)) > 1]
+        binaries = [name for name, elements in parts.items() if any(isinstance(element, _BYTES) for element in elements.values())]
+        if not matrices and not binaries:
+            return
+        variables = self._study().check(_changes(start_values=values, isolate=isolate), quiet=True)
+        types = {entry["name"]: entry["type"] for entry in variables}
+        known = arrays(types)
+        for name in matrices:
+            if name in known and _long(known[name].shape) != _long(shapes[name]):
+                sentence = f"{name} has the shape {known[name].shape}, found an array of the shape {shapes[name]}"
+                raise ConfigurationError(sentence, "Shape", {"name": name})
+        for name in binaries:
+            kind = types.get(known[name].elements[0] if name in known else name)
+            if kind not in ("Binary", None):
+                raise ConfigurationError(f"{name} is a {kind}, found bytes", "Value", {"name": name})
+
     def check(self, **changes: Any) -> None:
         """Find every error that is known before a run: loads and connects the FMUs, resolves all names.
 
@@ -392,6 +414,7 @@ class System:
             RunError: the run failed after its start; its ``results`` has the rows up to then.
             ResultsError: the file cannot be written; its ``results`` has the rows if the run has started.
         """
+        self._check_values(start_values, isolate)
         changes = _changes(
             start_values=start_values,
             faults=faults,
@@ -446,6 +469,7 @@ class System:
         The arguments are those of :meth:`run`. Use the simulation in a ``with`` statement, which frees
         the FMUs at its end.
         """
+        self._check_values(start_values, isolate)
         changes = _changes(
             start_values=start_values,
             faults=faults,
@@ -615,8 +639,13 @@ def _elements(value: Any, indices: tuple[int, ...] = ()) -> Iterator[tuple[tuple
         yield from _elements(item, (*indices, index))
 
 
+def _long(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the extents above 1, in whose order the elements are read."""
+    return tuple(extent for extent in shape if extent > 1)
+
+
 def _plain(value: Any) -> Any:
-    return value.hex() if isinstance(value, (bytes, bytearray)) else value
+    return value.hex() if isinstance(value, _BYTES) else value
 
 
 def _text(value: Any) -> str:

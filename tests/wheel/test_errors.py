@@ -47,6 +47,7 @@ def test_values_of_wrong_types_are_refused(paper):
     for wrong, error in [
         ({"start_values": {"plant.M": object()}}, TypeError),
         ({"start_values": {"plant.M": 10**30}}, ValueError),
+        ({"start_values": {"plant.M": b"25"}}, af.ConfigurationError),
         ({"start_values": {"plant.M": float("nan")}}, af.ConfigurationError),
         ({"record": "plant.x_p"}, TypeError),
         ({"time_limit": float("nan")}, ValueError),

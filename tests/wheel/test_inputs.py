@@ -152,6 +152,8 @@ def test_arrays_go_in_and_come_out_in_their_dimensions(packed):
     # As FMPy gives them.
     whole = af.simulate(fmu, stop_time=0.1, output=["x", "A"])
     assert whole["x"].shape[1:] == (2,) and whole["A"].shape[1:] == (2, 2) and len(whole) == 7
+    with pytest.raises(af.ConfigurationError, match=r"C has the shape \(2, 3\), found an array of the shape \(3, 2\)"):
+        af.simulate(fmu, start_values={**values, "C": c.T})
     with pytest.raises(af.ConfigurationError, match=r"u has the shape \(1,\), found .* \(3,\)"):
         af.simulate(fmu, input=lambda t: {"u": np.zeros(3)})
     with pytest.raises(af.ConfigurationError, match=r"u has the shape \(1,\), found \(3,\) in each row"):
