@@ -9,6 +9,7 @@ use fmu_description::Kind;
 use master::{Port, Simulation, Slave};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
+use pyo3::pyclass::{PyTraverseError, PyVisit};
 use pyo3::types::{PyDict, PyMapping};
 use results::{MemorySink, Recorded, Sink};
 use study::config::CheckpointSettings;
@@ -78,6 +79,11 @@ impl Study {
         let mut config = read(description, &folder)?;
         config.make_absolute()?;
         Ok(Self { config, folder, slaves })
+    }
+
+    /// Visits the slaves for the garbage collector: a slave may refer to the system that has this configuration.
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.slaves.iter().try_for_each(|(_, slave)| visit.call(slave))
     }
 
     /// Loads and connects the FMUs, and resolves all names, without a run. Returns the variables as dicts. If `quiet`,

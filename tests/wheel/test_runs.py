@@ -1,12 +1,14 @@
 """Runs of systems: the command is the reference."""
 
 import copy
+import gc
 import logging
 import os
 import pickle
 import signal
 import threading
 import time
+import weakref
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -310,6 +312,22 @@ def test_a_signal_of_numpy_is_that_of_the_same_lists_in_every_run():
     system.add_signal("p.u", points=np.array(points))
     other.add_signal("p.u", points=points)
     assert same(system.run(), other.run()) and same(system.run(), other.run())
+
+
+def test_an_object_that_knows_its_system_is_collected_with_it():
+    class Source:
+        outputs = ["y"]
+
+        def step(self, t, dt, inputs):
+            return {"y": t}
+
+    source = Source()
+    source.system = af.System().add("source", source)
+    source.system.run(stop_time=0.1, step=0.1)
+    collected = weakref.ref(source)
+    del source
+    gc.collect()
+    assert collected() is None
 
 
 def test_an_equal_object_takes_the_place_of_the_one_before():
