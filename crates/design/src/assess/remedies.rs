@@ -236,13 +236,13 @@ impl Variant {
         let distance = factor.ln().abs() * parts.len() as f64;
         let words: Vec<_> = parts.iter().map(|part| part.words.as_str()).collect();
         // Beside a stated bandwidth the command would choose the other one anew.
-        let kept = [
+        let unchanged = [
             observer.is_none().then(|| chosen("observer", &file.observer.requirement)),
             feedback.is_none().then(|| chosen("feedback", &file.feedback.requirement)),
         ];
-        let kept = kept.into_iter().flatten().flatten();
+        let unchanged = unchanged.into_iter().flatten().flatten();
         Some(Trial {
-            lines: parts.iter().map(|part| part.line.clone()).chain(kept).collect(),
+            lines: parts.iter().map(|part| part.line.clone()).chain(unchanged).collect(),
             words: words.join(" and "),
             judged,
             distance,
