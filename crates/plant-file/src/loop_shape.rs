@@ -59,8 +59,9 @@ impl LoopShape {
         let stated =
             table.require("bandwidth", "the frequency, in rad/s, below which |S| is small")?;
         let bandwidth = stated.positive()?;
+        let usual = Self::with_bandwidth(bandwidth, entry.place);
         if let Domain::Sampled { period } = domain
-            && bandwidth * period > PER_SAMPLE
+            && !usual.suits(period)
         {
             let most = PER_SAMPLE / period;
             return Err(stated.error(format!(
@@ -69,12 +70,25 @@ impl LoopShape {
         }
         let rule = "expected at least 1, as S is I at high frequencies";
         let peak = optional(&table, "peak", |entry| positive_within(entry, 1.0.., rule))?;
-        let peak = peak.unwrap_or(PEAK);
-        let roll_off = positive(&table, "roll_off")?.unwrap_or(ROLL_OFF * bandwidth);
+        let peak = peak.unwrap_or(usual.peak);
+        let roll_off = positive(&table, "roll_off")?.unwrap_or(usual.roll_off);
         let effort = positive(&table, "effort")?;
-        let set_point = positive(&table, "set_point")?.unwrap_or(SET_POINT * bandwidth);
+        let set_point = positive(&table, "set_point")?.unwrap_or(usual.set_point);
         let pid = Pid::read(file, &table, signals, roll_off)?;
-        Ok(Some(Self { bandwidth, set_point, peak, roll_off, effort, pid, place: entry.place }))
+        Ok(Some(Self { set_point, peak, roll_off, effort, pid, ..usual }))
+    }
+
+    /// The shape of a table that states only `bandwidth`, in rad/s.
+    #[must_use]
+    pub fn with_bandwidth(bandwidth: f64, place: Place) -> Self {
+        let (set_point, roll_off) = (SET_POINT * bandwidth, ROLL_OFF * bandwidth);
+        Self { bandwidth, set_point, peak: PEAK, roll_off, effort: None, pid: None, place }
+    }
+
+    /// Whether the bandwidth is slow enough for samples every `period` seconds.
+    #[must_use]
+    pub fn suits(&self, period: f64) -> bool {
+        self.bandwidth * period <= PER_SAMPLE
     }
 
     /// The requests on feedback and observer from which the search starts, in the order of the search.

@@ -11,6 +11,8 @@ use crate::report::robustness::{LoopPoint, Remedy, Robustness};
 use crate::solve::designed::design;
 use crate::solve::solution::Solution;
 use plant_file::PlantFile;
+use plant_file::estimation::Law;
+use plant_file::loop_shape::LoopShape;
 use plant_file::requirements::{Bandwidth, Requirement};
 use plant_file::robustness::RobustnessLimits;
 use plant_file::signals::Signal;
@@ -24,10 +26,13 @@ const FASTEST: f64 = 4.0;
 const WEIGHT_POWER: i32 = -4;
 /// Largest number of states for which changed requirements are tried.
 const LARGEST_ORDER: usize = 24;
+/// Largest number of states for which gains by the shape of the loop are tried: for 8 they take some 10 s.
+const LARGEST_SHAPED: usize = 8;
 /// Part of the present peak of S below which a change must bring this peak to be proposed.
 const LOWER: f64 = 0.95;
 
-/// Returns a remedy for each peak of S above its limit, and for instability within the tolerances. There is none for
+/// Returns a remedy for each peak of S above its limit, and for instability within the tolerances: slower or faster loops,
+/// and the shape of the loop where none of them makes the verdict green. There is none for
 /// gains by linear matrix inequalities or by the shape of the loop, for requirements that are not scaled, for several
 /// plants or a large one, and without time.
 pub(crate) fn remedies(
@@ -73,6 +78,10 @@ pub(crate) fn remedies(
     let is_complete = tried.iter().all(Option::is_some);
     let mut trials: Vec<_> = tried.into_iter().flatten().flatten().collect();
     trials.sort_by(|one, other| one.distance.total_cmp(&other.distance));
+    if order <= LARGEST_SHAPED && !trials.iter().any(|trial| trial.judged.is_green(limits)) {
+        let shaped = budget.run(|| shaped(file, varies));
+        trials.extend(shaped.filter(|_| !budget.is_over()));
+    }
     let remedy = |reason: Reason| reason.remedy(&trials, is_complete, &present, limits);
     reasons.into_iter().filter_map(remedy).collect()
 }
@@ -103,6 +112,43 @@ pub(crate) fn of_units(
         Some(Remedy { reason, change, lines: Vec::new() })
     };
     robustness.points.iter().zip(signals).filter_map(remedy).collect()
+}
+
+/// Designs gains by the shape of a loop with the bandwidth of the present feedback; None for other requirements and
+/// laws, if the loop is not stable, and where the plant file cannot have `[loop]`.
+fn shaped(file: &PlantFile<'_>, varies: bool) -> Option<Trial> {
+    let Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }) = file.feedback.requirement
+    else {
+        return None;
+    };
+    if file.estimation.law != Law::Augmented {
+        return None;
+    }
+    let line = format!("loop.bandwidth = {}", rounded(rate));
+    let mut other = file.clone();
+    let shape = LoopShape::with_bandwidth(as_shown(rate), file.feedback.place.clone());
+    if file.sampling.is_some_and(|sampling| !shape.suits(sampling.period)) {
+        return None;
+    }
+    other.loop_shape = Some(shape);
+    Some(Trial {
+        words: format!("`{line}` in place of `feedback` and `observer`"),
+        lines: vec![line],
+        judged: judged(&other, varies)?,
+        distance: f64::INFINITY,
+    })
+}
+
+/// Designs the controller of `file` and examines its loop, within the tolerances if `varies`; None if there is no
+/// design, or its loop is not stable.
+fn judged(file: &PlantFile<'_>, varies: bool) -> Option<Judged> {
+    let nominal = design(file).ok()?.nominal;
+    Judged::of(&nominal, varies.then_some(&file.robustness)).ok().flatten()
+}
+
+/// The value with the digits in which a remedy states it.
+fn as_shown(value: f64) -> f64 {
+    rounded(value).parse().unwrap_or(value)
 }
 
 /// A reason of the verdict, and the aim of a change of the requirements.
@@ -168,13 +214,11 @@ fn variants(file: &PlantFile<'_>) -> Vec<Variant> {
 /// Returns the requirement of the loop `name` with eigenvalues or bandwidth times `factor`, or with a scaled weight,
 /// named `weight`; None for other requirements.
 fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> Option<Scaled> {
-    // The remedy states the requirement with these digits.
-    let short = |value: f64| rounded(value).parse::<f64>().unwrap_or(value);
     let (requirement, line, words) = match requirement {
         Requirement::Eigenvalues(all) => {
             let all: Vec<_> = all
                 .iter()
-                .map(|value| Complex::new(short(factor * value.re), short(factor * value.im)))
+                .map(|value| Complex::new(as_shown(factor * value.re), as_shown(factor * value.im)))
                 .collect();
             let shown = all.iter().filter(|value| value.im >= 0.0).map(|value| {
                 let (re, im) = (rounded(value.re), rounded(value.im));
@@ -185,8 +229,8 @@ fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> O
             (Requirement::Eigenvalues(all), line, words)
         }
         Requirement::Weights { states, channels } => {
-            let size = short(factor.powi(WEIGHT_POWER));
-            let channels: DMatrix<f64> = channels.map(|entry| short(size * entry));
+            let size = as_shown(factor.powi(WEIGHT_POWER));
+            let channels: DMatrix<f64> = channels.map(|entry| as_shown(size * entry));
             let rows = channels.row_iter().map(|row| {
                 let entries: Vec<_> = row.iter().map(|entry| rounded(*entry)).collect();
                 format!("[{}]", entries.join(", "))
@@ -196,7 +240,7 @@ fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> O
             (Requirement::Weights { states: states.clone(), channels }, line, words)
         }
         Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }) => {
-            let rate = short(factor * rate);
+            let rate = as_shown(factor * rate);
             let bandwidth = Bandwidth { rate: Some(rate), is_stated: true };
             let line = format!(".bandwidth = {}", rounded(rate));
             let words = format!(".bandwidth {factor} times as large");
@@ -229,8 +273,7 @@ impl Variant {
         if let Some(feedback) = &feedback {
             other.feedback.requirement = feedback.requirement.clone();
         }
-        let nominal = design(&other).ok()?.nominal;
-        let judged = Judged::of(&nominal, varies.then_some(&file.robustness)).ok().flatten()?;
+        let judged = judged(&other, varies)?;
         let parts: Vec<_> = observer.iter().chain(&feedback).collect();
         #[expect(clippy::cast_precision_loss, reason = "one or two loops")]
         let distance = factor.ln().abs() * parts.len() as f64;
