@@ -39,6 +39,31 @@ fn bad_units_cost_no_precision() {
     }
 }
 
+/// A pendulum under three integrators in a row, in mixed order: the QR algorithm alone makes the triple zero 3e-7.
+#[test]
+fn integrators_behind_a_plant_have_eigenvalues_of_exactly_zero() {
+    let (stiffness, damping) = (0.479_403_314_451_799, 0.011_113_670_092_665_5);
+    let mut a = DMatrix::zeros(5, 5);
+    for (row, column, entry) in [
+        (4, 0, 1.0),
+        (0, 2, 1.0),
+        (2, 1, 1.534_491_392_389_36e-3),
+        (2, 3, 3.557_303_544_000_62e-5),
+        (1, 3, 1.0),
+        (3, 1, -stiffness),
+        (3, 3, -damping),
+    ] {
+        a[(row, column)] = entry;
+    }
+    let eigenvalues = eigenvalues(&a).unwrap();
+    assert_eq!(eigenvalues.iter().filter(|value| value.norm() == 0.0).count(), 3);
+    let frequency = (stiffness - 0.25 * damping * damping).sqrt();
+    let pair = [Complex::new(-0.5 * damping, -frequency), Complex::new(-0.5 * damping, frequency)];
+    for (value, expected) in eigenvalues.iter().zip(pair) {
+        assert!((value - expected).norm() < 1e-15, "{value}");
+    }
+}
+
 #[test]
 fn the_instability_is_the_largest_real_part_or_the_spectral_radius_less_one() {
     let saddle = matrix(2, 2, &[-7.0, 0.0, 3.0, 0.5]);
