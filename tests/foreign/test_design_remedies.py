@@ -115,21 +115,38 @@ def test_units_remove_a_peak_that_comes_from_signals_without_units(aso_ftc, tmp_
 
 
 # A rotor that moves a mass on a spring (TORA): C.-J. Wan, D. S. Bernstein and V. T. Coppola, Nonlinear Dynamics 10 (1996).
-# The command chooses both bandwidths.
+# The command chooses both bandwidths, and no other ones are better than the shape of the loop.
 ROTOR = """A = [[0, 1, 0, 0], [-1.0416667, 0, 0, 0], [0, 0, 0, 1], [0.2083333, 0, 0, 0]]
 B = [[0], [-0.2083333], [0], [1.0416667]]
 C = [[1, 0, 0, 0], [0, 0, 1, 0]]
 actuator_faults = "all"
 """
 
+STATED = "feedback.bandwidth = 0.26\nobserver.bandwidth = 1\n"
+# A flexible satellite (FS of COMPleib, F. Leibfritz 2004) with a triple eigenvalue 0.
+SATELLITE = """A = [[0, 0, 1, 0, 0], [0, 0, 0, 1, 0], [0, 1.53449139238936e-3, 0, 3.55730354400062e-5, 0], [0, -0.479403314451799, 0, -0.0111136700926655, 0], [1, 0, 0, 0, 0]]
+B = [[0], [0], [6.26668897607942e-5], [-0.015547655349653], [0]]
+C = [[1, 0, 0, 0, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 1]]
+actuator_faults = "all"
+"""
 
-@pytest.mark.parametrize("plant", [REMEDIED, ROTOR], ids=["eigenvalues", "chosen bandwidths"])
+
+@pytest.mark.parametrize(
+    "plant",
+    [REMEDIED, ROTOR, ROTOR + STATED, SATELLITE],
+    ids=["eigenvalues", "shape of the loop", "shape in place of bandwidths", "chosen bandwidths"],
+)
 def test_the_lines_that_follow_a_reason_of_the_verdict_give_the_stated_peaks(aso_ftc, tmp_path, plant):
     _, report = design_and_report(aso_ftc, tmp_path, plant)
     verdict = report["verdict"]
-    assert verdict["level"] == "amber" and [one["reason"] for one in verdict["remedies"]] == verdict["reasons"]
-    for remedy in verdict["remedies"]:
+    assert verdict["level"] != "green" and [one["reason"] for one in verdict["remedies"]] == verdict["reasons"]
+    remedies = [remedy for remedy in verdict["remedies"] if remedy["lines"]]
+    assert len(remedies) == 2
+    for remedy in remedies:
         names = {line.split(" = ")[0] for line in remedy["lines"]}
+        if names == {"loop.bandwidth"}:
+            assert "in place of `feedback` and `observer`" in remedy["change"]
+            names |= {"feedback.bandwidth", "observer.bandwidth"}
         changed = [line for line in plant.splitlines() if line.split(" = ")[0] not in names]
         _, other = design_and_report(aso_ftc, tmp_path, "\n".join([*remedy["lines"], *changed]))
         peaks = [point["judged"] for point in other["robustness"]["points"]]
