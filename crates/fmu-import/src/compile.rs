@@ -64,7 +64,7 @@ pub enum CompileError {
         path: PathBuf,
         /// The program and the file, or "linking".
         command: String,
-        /// The start of the program's output.
+        /// The start of the program's output; without any, its exit status or signal.
         output: String,
     },
     /// A file or folder cannot be read or written, or a program cannot be started.
@@ -369,11 +369,13 @@ impl<'a> Build<'a> {
         }
         let messages = String::from_utf8_lossy(&output.stderr)
             .replace(&format!("{}/", self.sources.display()), "");
-        Err(CompileError::Failed {
-            path: self.path.to_owned(),
-            command: format!("{program} for {what}"),
-            output: messages.chars().take(OUTPUT).collect::<String>().trim().to_owned(),
-        })
+        let messages = messages.chars().take(OUTPUT).collect::<String>();
+        let output = match messages.trim() {
+            "" => output.status.to_string(),
+            messages => messages.to_owned(),
+        };
+        let (path, command) = (self.path.to_owned(), format!("{program} for {what}"));
+        Err(CompileError::Failed { path, command, output })
     }
 }
 

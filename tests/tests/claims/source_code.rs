@@ -159,4 +159,9 @@ fn a_missing_compiler_and_wrong_code_are_named() {
     let output = run(folder.path(), "cc -Dfmi2Component=struct", &compile);
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));
     assert!(said(&output).contains("failed") && said(&output).contains("deeds.c"));
+    let killed = folder.path().join("killed");
+    std::fs::write(&killed, "[ \"$1\" = --version ] || kill -9 $$").unwrap();
+    let output = run(folder.path(), format!("sh {}", killed.display()), &compile);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("failed: signal: 9"), "{}", said(&output));
 }
