@@ -199,6 +199,10 @@ fn default_extrapolation(system: &System, reasons: &mut Vec<String>) -> Extrapol
         system.connections.iter().map(|connection| connection.to.slave).collect();
     receivers.sort_unstable();
     receivers.dedup();
+    if receivers.is_empty() {
+        reasons.push("extrapolation limited: no input is connected".to_owned());
+        return Extrapolation::Limited;
+    }
     // FMI 3.0 has no canInterpolateInputs: an FMU asks for the inputs that have intermediateUpdate.
     let is_fmi3 = |&k: &usize| system.slaves[k].1.description().version() == Version::V3;
     let (fmi3, others): (Vec<usize>, Vec<usize>) = receivers.into_iter().partition(is_fmi3);

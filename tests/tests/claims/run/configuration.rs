@@ -139,6 +139,7 @@ fn an_explanation_says_what_was_chosen_and_why() {
     }
     let said = printed(&bench.run(&["--fmu", &format!("c={}", fmu("AsoController")), "--explain"]));
     assert!(said.contains("stop time 100 s: the latest stopTime of all DefaultExperiments (c)"));
+    assert!(said.contains("extrapolation limited: no input is connected"), "{said}");
 }
 
 #[test]
