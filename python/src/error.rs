@@ -178,8 +178,9 @@ pub(crate) fn system(error: &SystemError) -> Exception {
         E::Call { slave, time, source } => {
             with_call(failed("Call").text("fmu", slave).number("time", *time), source)
         }
-        E::Unreadable { slave, name, time, source } => {
-            let exception = failed("Unreadable").text("fmu", &**slave).text("name", &**name);
+        E::Unreadable { slave, name, time, source } | E::Variable { slave, name, time, source } => {
+            let kind = if matches!(error, E::Variable { .. }) { "Call" } else { "Unreadable" };
+            let exception = failed(kind).text("fmu", &**slave).text("name", &**name);
             with_call(exception.number("time", *time), source)
         }
         E::Unsettled { names, time, .. } => {

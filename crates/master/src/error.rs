@@ -184,10 +184,22 @@ pub enum SystemError {
         /// Function, status and messages.
         source: CallError,
     },
+    /// An FMI call for a variable failed, and the FMU cannot be used any more.
+    #[error("{name} at t = {} s: {source}", seconds(*time))]
+    Variable {
+        /// The slave.
+        slave: Box<str>,
+        /// The variable, as `slave.variable`.
+        name: Box<str>,
+        /// Time of the master in s.
+        time: f64,
+        /// Function, status and messages.
+        source: CallError,
+    },
     /// An FMI call failed.
     #[error("{slave} at t = {} s: {source}", seconds(*time))]
     Call {
-        /// The slave, or one of its variables.
+        /// The slave.
         slave: String,
         /// Time of the master in s.
         time: f64,

@@ -7,7 +7,7 @@ use std::collections::hash_map::Entry;
 use fmu_description::{Causality, Initial, Kind};
 
 use super::{Port, System};
-use crate::error::{SystemError, call};
+use crate::error::SystemError;
 use slave::{CallError, Value};
 
 /// A value for a variable.
@@ -108,10 +108,12 @@ impl System {
     /// Returns an error if the FMU cannot be used any more after `error` of a call for a variable (FMI 2.0.5,
     /// section 2.1.3).
     fn go_on_after(&self, port: Port, time: f64, error: CallError) -> Result<(), SystemError> {
+        let name: Box<str> = self.name(port).into();
         if error.ends_the_instance() {
-            return Err(call(&self.name(port), time, error));
+            let slave = self.slaves[port.slave].0.as_str().into();
+            return Err(SystemError::Variable { slave, name, time, source: error });
         }
-        tracing::debug!("{}: {error}", self.name(port));
+        tracing::debug!("{name}: {error}");
         Ok(())
     }
 

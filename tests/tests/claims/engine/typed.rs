@@ -1,8 +1,12 @@
 //! A slave with variables of all types, which allocates nothing.
 
 use fmu_description::ModelDescription;
+use fmu_description::abi::Status;
 use master::fault::{Fault, FaultChain, Window};
-use master::{Algorithm, CallError, Scenario, Simulation, Slave, StepResult, System, Value};
+use master::{
+    Algorithm, CallError, Failure, Scenario, Simulation, Slave, StepResult, System, SystemError,
+    Value,
+};
 
 use crate::engine::until;
 
@@ -205,6 +209,10 @@ impl Slave for Single {
         &self.description
     }
     fn get_real(&mut self, _: &[u32], values: &mut [f64]) -> Done {
+        if self.value < 0.0 {
+            let failure = Failure::Status(Status::Error);
+            return Err(CallError { function: "fmi3GetFloat32", failure, messages: Vec::new() });
+        }
         values[0] = self.value.into();
         Ok(())
     }
@@ -230,6 +238,19 @@ fn a_parameter_of_type_float32_keeps_a_setting_that_it_rounds() {
     let mut simulation = Simulation::new(system, &Algorithm::new(1.0), &until(1.0)).unwrap();
     let value = simulation.system().get_value(parameter).unwrap();
     assert_eq!(value, Value::Real(0.1_f32.into()));
+}
+
+#[test]
+fn a_setting_that_ends_its_fmu_is_an_error_of_this_fmu_that_names_the_variable() {
+    let variables = r#"<Float32 name="p" valueReference="0" causality="parameter" start="1"/>"#;
+    let mut system = System::default();
+    let description = of_fmi_3(variables).description;
+    system.add("a", Box::new(Single { description, value: 1.0 })).unwrap();
+    system.set("a.p", "-1").unwrap();
+    let error = Simulation::new(system, &Algorithm::new(1.0), &until(1.0)).err().unwrap();
+    assert_eq!(error.to_string(), "a.p at t = 0 s: fmi3GetFloat32 returned fmi3Error");
+    let SystemError::Variable { slave, .. } = &error else { panic!("{error:?}") };
+    assert_eq!(&**slave, "a");
 }
 
 impl Slave for Typed {
