@@ -134,7 +134,7 @@ impl System {
             return Err(unknown(name, variable, self.slaves[slave].1.description()));
         }
         let Some((slave, _)) = name.split_once('.') else {
-            let form = "slave.variable";
+            let form = "FMU.VARIABLE";
             return Err(SystemError::Syntax { text: name.to_owned(), form });
         };
         Err(self.unknown_slave(name, slave))

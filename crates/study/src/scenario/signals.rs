@@ -147,7 +147,7 @@ impl<'a> Resolver<'a> {
         let known = first_names(&table.names);
         let expected = match &entry.element {
             Some(element) => format!("a free input of {}", element.get_ref()),
-            None => "slave.variable of a free input".to_owned(),
+            None => "FMU.VARIABLE of a free input".to_owned(),
         };
         Err(Reason::NoColumn { path: file, expected, known })
     }

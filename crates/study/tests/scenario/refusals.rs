@@ -33,7 +33,7 @@ fn variables_that_are_missing_or_cannot_be_set_are_refused() {
     for (name, message) in [
         ("plant.forc", "plant.forc: Listener has no variable \"forc\", it has force, F_c"),
         ("pump.x", "pump.x: there is no FMU of the name \"pump\", expected one of plant, ctrl"),
-        ("force", "\"force\" names no variable, expected the form slave.variable"),
+        ("force", "\"force\" names no variable, expected the form FMU.VARIABLE"),
         ("plant.y", "plant.y is a continuous output, expected an input or a tunable parameter"),
         ("plant.mass", "plant.mass is a fixed parameter, expected an input or a tunable parameter"),
         (
@@ -164,7 +164,7 @@ fn files_that_do_not_fit_are_refused() {
         (
             "scenario.table = [{ csv = \"a.csv\" }]".to_owned(),
             format!(
-                "scenario.table[1]: {}: no column is called as slave.variable of a free input, it \
+                "scenario.table[1]: {}: no column is called as FMU.VARIABLE of a free input, it \
                  has u, count",
                 path("a.csv")
             ),
