@@ -127,11 +127,19 @@ pub fn parse(text: &str, path: &Path) -> Result<Config, PlaceError> {
     let source = Source::new(path, text.to_owned());
     let mut config: Config = toml::from_str(text).map_err(|error| {
         let end = text.len();
-        source.error(&error.span().unwrap_or(end..end), error.message())
+        let message = format!("{}{}", error.message(), advice(text));
+        source.error(&error.span().unwrap_or(end..end), message)
     })?;
     config.check().map_err(|(place, message)| source.error(&place, message))?;
     config.rebase(path.parent().unwrap_or(Path::new("")));
     Ok(config)
+}
+
+/// Returns the end of the error for a `text` that is a plant file; empty for other texts.
+fn advice(text: &str) -> &'static str {
+    let file: toml::Table = text.parse().unwrap_or_default();
+    let is_plant = ["A", "actuators", "measurements"].iter().any(|key| file.contains_key(*key));
+    if is_plant { ". This is a plant file: `aso-ftc design` reads it" } else { "" }
 }
 
 impl Config {

@@ -123,6 +123,7 @@ fn every_interval_reads_back_as_the_same() {
 fn errors_state_line_column_and_expectation() {
     for (text, parts) in [
         ("sytem = 'a.ssp'", ["system.toml:1:1", "sytem", "`system`"]),
+        ("A = [[0]]\nB = [[1]]", ["system.toml:1:1", "plant file", "`aso-ftc design`"]),
         ("\n[algorithm]\nstpe = 1", ["system.toml:3:1", "stpe", "`step`"]),
         ("[algorithm]\nmethod = 'jakobi'", ["system.toml:2:10", "jakobi", "gauss-seidel"]),
         ("[experiment]\nstop-time = inf", ["system.toml:2:13", "stop-time", "finite"]),
