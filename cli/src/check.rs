@@ -126,14 +126,13 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
         let (mut result, mut trial_findings) = run(options, unpacked)?;
         let folder = format!("{}/", unpacked.folder().display());
         if let TrialResult::No { reason } = &mut result {
-            *reason = sections::renamed(&reason.replace(&folder, ""), description.version());
+            *reason = sections::renamed(&reason.replace(&folder, ""), description);
         }
-        let version = description.version();
         for finding in &mut trial_findings {
-            finding.what = sections::renamed(&finding.what.replace(&folder, ""), version);
-            finding.place = sections::renamed(&finding.place, version);
+            finding.what = sections::renamed(&finding.what.replace(&folder, ""), description);
+            finding.place = sections::renamed(&finding.place, description);
         }
-        sections::renumber(&mut trial_findings, version);
+        sections::renumber(&mut trial_findings, description.version());
         findings.extend(trial_findings);
         result
     };

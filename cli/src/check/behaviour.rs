@@ -189,7 +189,8 @@ impl<S: Slave> Trial<'_, S> {
             }
             Some(error) => self.report(error, "when an instance is made", "2.1.5"),
             None => {
-                let why = "No importer can use it here.";
+                let why = "Here it cannot be instantiated. It may need something that is missing \
+                           here, such as a Python package or a licence.";
                 let what = format!("{error:#}");
                 let unresolved = what.contains("undefined symbol");
                 self.findings.add(Error, "fmi2Instantiate", what, why, "2.1.5");

@@ -1,6 +1,6 @@
 //! Sections and names of the standard in findings about archive, libraries and behaviour.
 
-use fmu_description::Version;
+use fmu_description::{ModelDescription, Version};
 
 use super::finding::Finding;
 
@@ -36,9 +36,18 @@ const NAMES: [(&str, &str, &str); 9] = [
     ("canSerializeFMUstate", "canSerializeFMUstate", "canSerializeFMUState"),
 ];
 
-/// Replaces names of FMI 2.0 in a text by the names of `version`.
-pub(super) fn renamed(text: &str, version: Version) -> String {
-    NAMES.iter().fold(text.to_owned(), |text, (second, first, third)| match version {
+/// Replaces names of FMI 2.0 in a text by the names of the version of the FMU and of the interface that a trial uses.
+pub(super) fn renamed(text: &str, description: &ModelDescription) -> String {
+    let version = description.version();
+    let is_scheduled = description.scheduled_execution.is_some();
+    let instantiate = match (version, description.co_simulation.is_some()) {
+        (Version::V1, false) => "fmiInstantiateModel",
+        (Version::V3, false) if is_scheduled => "fmi3InstantiateScheduledExecution",
+        (Version::V3, false) => "fmi3InstantiateModelExchange",
+        _ => "fmi2Instantiate",
+    };
+    let text = text.replace("fmi2Instantiate", instantiate);
+    NAMES.iter().fold(text, |text, (second, first, third)| match version {
         Version::V1 => text.replace(second, first),
         Version::V2 => text,
         Version::V3 => text.replace(second, third),
@@ -63,16 +72,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn messages_name_the_functions_of_the_version_of_the_fmu() {
+    fn messages_name_the_functions_of_the_version_and_interface_of_the_fmu() {
         let text =
             "fmi2SetFMUstate: differs, expected fmi2Error, though canGetAndSetFMUstate is true";
         let third =
             "fmi3SetFMUState: differs, expected fmi3Error, though canGetAndSetFMUState is true";
-        assert_eq!(renamed(text, Version::V2), text);
-        assert_eq!(renamed(text, Version::V3), third);
+        let simulation = Some(fmu_description::CoSimulation::default());
+        let of = |version: &str, co_simulation| ModelDescription {
+            fmi_version: version.to_owned(),
+            co_simulation,
+            ..ModelDescription::default()
+        };
+        assert_eq!(renamed(text, &of("2.0", simulation.clone())), text);
+        assert_eq!(renamed(text, &of("3.0", simulation.clone())), third);
         assert_eq!(
-            renamed("fmi2DoStep after fmi2Terminate", Version::V1),
+            renamed("fmi2DoStep after fmi2Terminate", &of("1.0", simulation.clone())),
             "fmiDoStep after fmiTerminateSlave"
         );
+        for (version, of_slave, of_model) in [
+            ("1.0", "fmiInstantiateSlave", "fmiInstantiateModel"),
+            ("2.0", "fmi2Instantiate", "fmi2Instantiate"),
+            ("3.0", "fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange"),
+        ] {
+            assert_eq!(renamed("fmi2Instantiate", &of(version, simulation.clone())), of_slave);
+            assert_eq!(renamed("fmi2Instantiate", &of(version, None)), of_model);
+        }
     }
 }
