@@ -66,6 +66,10 @@ def test_a_number_beyond_63_bits_is_an_error_that_names_the_variable(fmu, aso_ft
     done = aso_ftc("run", "--fmu", f"m={fmu}", "--stop-time", "0.2", "--step", "0.1", "--out", tmp_path)
     assert done.returncode != 0
     assert "gives uint64_out a value of type UInt64 that the importer cannot represent" in done.stderr
+    answer = aso_ftc("check", fmu).stdout
+    assert "runs in this master: yes" in answer
+    assert "note: variable uint64_out: is above 2^63 - 1 after 0 steps" in answer
+    assert "fmi3GetUInt64" not in answer
 
 
 def test_a_model_with_such_a_type_is_refused_for_fmi_2_by_name(aso_ftc, root, tmp_path):

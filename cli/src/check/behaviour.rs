@@ -109,7 +109,9 @@ impl<S: Slave> Trial<'_, S> {
     /// Records the steps of the first instance; if there are fewer steps than planned, the last note is the reason.
     fn record_success(&mut self, trajectory: &Trajectory) {
         let steps = u32::try_from(trajectory.len().saturating_sub(1)).unwrap_or(u32::MAX);
-        let note = self.findings.all.iter().rfind(|finding| finding.severity == Note);
+        let is_step =
+            |finding: &&Finding| finding.severity == Note && finding.place == "fmi2DoStep";
+        let note = self.findings.all.iter().rfind(is_step);
         self.result = TrialResult::Yes {
             steps,
             step: self.step_size(),
@@ -363,14 +365,18 @@ impl<S: Slave> Trial<'_, S> {
         Some(())
     }
 
-    /// Adds a finding for each output with a value that is not finite.
+    /// Adds a finding for each output with a value that is not finite, or that the importer cannot represent.
     fn check_finite(&mut self, trajectory: &Trajectory) {
         for (index, variable) in outputs(self.description).take(VARIABLES).enumerate() {
-            let step = trajectory
-                .iter()
-                .position(|row| row.get(index).is_some_and(|value| !value.is_finite()));
-            if let Some(step) = step {
-                let place = format!("variable {}", variable.name);
+            let position = |is_such: fn(&Value) -> bool| {
+                trajectory.iter().position(|row| row.get(index).is_some_and(is_such))
+            };
+            let place = format!("variable {}", variable.name);
+            if let Some(step) = position(Value::is_beyond) {
+                let what =
+                    format!("is above 2^63 - 1 after {step} steps, which `run` cannot record");
+                self.findings.add(Note, place, what, "", "");
+            } else if let Some(step) = position(|value| !value.is_finite()) {
                 let what = format!("is no finite number after {step} steps");
                 let why = "Most masters carry it on to the end of the run.";
                 self.findings.add(Warning, place, what, why, "2.2.7");

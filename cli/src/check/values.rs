@@ -2,7 +2,7 @@
 
 use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
 use master::Value::Real;
-use master::{CallError, Slave, ValueType};
+use master::{CallError, Failure, Slave, ValueType};
 
 /// A value of any type; equality compares bits.
 #[derive(Clone, Debug)]
@@ -61,6 +61,11 @@ impl Value {
         }
     }
 
+    /// Whether the importer cannot represent the value.
+    pub(super) fn is_beyond(&self) -> bool {
+        matches!(&self.0, master::Value::String(text) if text == BEYOND)
+    }
+
     pub(super) fn is_finite(&self) -> bool {
         !matches!(self.0, Real(value) if !value.is_finite())
     }
@@ -81,9 +86,21 @@ pub(super) fn distance(one: &[Vec<Value>], other: &[Vec<Value>]) -> f64 {
     (0..one.first().map_or(0, Vec::len)).map(of_output).fold(0.0, f64::max)
 }
 
+/// The text of a `UInt64` that the importer cannot represent. Such values are equal in a comparison.
+const BEYOND: &str = "a value above 2^63 - 1";
+
 /// Reads one variable.
 pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Value, CallError> {
-    master::read_value(slave, variable.value_reference, ValueType::of(&variable.kind)).map(Value)
+    let kind = ValueType::of(&variable.kind);
+    match master::read_value(slave, variable.value_reference, kind) {
+        // This is a limit of the importer, not a fault of the FMU.
+        Err(CallError { failure: Failure::InvalidAnswer(text), .. })
+            if text.contains("that the importer cannot represent") =>
+        {
+            Ok(Value(master::Value::String(BEYOND.to_owned())))
+        }
+        read => read.map(Value),
+    }
 }
 
 /// Returns the start value in the XML; `None` without a stated start value.

@@ -19,6 +19,14 @@ macro_rules! native_types {
                 }
             }
 
+            /// Returns the name of the function that reads variables of the type.
+            #[must_use]
+            pub const fn getter(self) -> &'static str {
+                match self {
+                    $(Self::$name => concat!("fmi3Get", stringify!($name)),)*
+                }
+            }
+
             /// Returns the name of the function that sets variables of the type.
             #[must_use]
             pub const fn setter(self) -> &'static str {

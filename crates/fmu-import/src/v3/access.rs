@@ -54,7 +54,7 @@ impl Instance {
                     } else {
                         format!("cannot read {name}, a variable of type {kind}")
                     };
-                    return Err(refused(function, what));
+                    return Err(refused(run.kind.getter(), what));
                 }
             }
             Ok(())
