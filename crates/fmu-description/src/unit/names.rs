@@ -79,7 +79,7 @@ const SCALES: [Scale; 2] = [
         name: "degF",
         exponents: [0, 0, 0, 0, 1, 0, 0, 0],
         factor: 5.0 / 9.0,
-        offset: 273.15 - 32.0 * 5.0 / 9.0,
+        offset: 45_967.0 / 180.0,
     },
 ];
 

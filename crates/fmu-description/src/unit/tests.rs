@@ -38,6 +38,30 @@ fn values_convert_between_units_of_one_quantity_only() {
     }
 }
 
+/// The literals are the decimal or rational conversions, which the compiler rounds correctly.
+#[test]
+fn rational_conversions_are_rounded_once() {
+    for (from, to, expected) in [
+        ("m/s", "km/h", (3.6, 0.0)),
+        ("km/h", "m/s", (5.0 / 18.0, 0.0)),
+        ("m/min", "km/h", (0.06, 0.0)),
+        ("nm", "um", (0.001, 0.0)),
+        ("ft", "in", (12.0, 0.0)),
+        ("K", "degC", (1.0, -273.15)),
+        ("K", "degF", (1.8, -459.67)),
+        ("degC", "degF", (1.8, 32.0)),
+        ("degF", "degC", (5.0 / 9.0, -160.0 / 9.0)),
+    ] {
+        let (factor, offset) = base(from).conversion(&base(to)).unwrap();
+        let actual = (factor.to_bits(), offset.to_bits());
+        assert_eq!(
+            actual,
+            (f64::to_bits(expected.0), f64::to_bits(expected.1)),
+            "{from} to {to}: {factor} {offset}"
+        );
+    }
+}
+
 #[test]
 fn all_ways_to_write_a_product_mean_the_same() {
     for expression in ["kg.m2/s2", "kg*m^2/s^2", "kg m2/s2", "kg . m^2 . s-2", "N.m", "kg.m.m/s/s"]
