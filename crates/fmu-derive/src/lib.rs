@@ -40,7 +40,7 @@ use syn::{DeriveInput, ItemImpl, parse_macro_input};
 /// | `output` | other FMUs may be connected to it |
 /// | `parameter` | fixed after initialization |
 /// | `tunable` | a parameter that the importer may change between steps |
-/// | `calculated_parameter` | computed from parameters in `initialize` |
+/// | `calculated_parameter` | computed from parameters in `initialize`, or in `update` if it depends on a `tunable` one (`initially(...)` states on which; without it on all) |
 /// | `local` | only observed |
 /// | `constant` | local, with a value that never changes |
 /// | `skip` | no variable: a field of the state that the importer does not see |

@@ -14,7 +14,7 @@ use std::collections::HashSet;
 
 use crate::model::{Failure, Model};
 use crate::variable::{Access, Base, Declaration, Enumeration, Fields, Number, Variable};
-use describe::{describe_aliases, describe_variables, replace_type};
+use describe::{describe_aliases, describe_variables, replace_type, tune_calculated_parameters};
 use fmu_description::call_order::{InterfaceType, settable};
 use fmu_description::call_order3;
 use fmu_description::location::NO_FOLDER;
@@ -68,7 +68,8 @@ impl<M: Model> Interface<M> {
     /// values. The description has the variables of both versions of FMI until [`Interface::restrict`] or
     /// [`Interface::convert`].
     pub(crate) fn new(model: &mut M) -> Result<(Self, ModelDescription), Failure> {
-        let (variables, fields) = split(model.variables());
+        let (mut variables, fields) = split(model.variables());
+        tune_calculated_parameters(&mut variables);
         let mut description = general::general::<M>(model);
         description.log_categories = general::categories(model.log().is_some(), M::LOG_CATEGORIES);
         let named = structure::Variables::new(&variables);

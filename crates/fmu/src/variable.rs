@@ -294,7 +294,9 @@ impl<M> Variable<M> {
         /// Makes the variable an input.
         input() causality = Causality::Input, initial = None;
         /// Makes the variable a parameter that [`Model::initialize`](crate::Model::initialize) computes from
-        /// other parameters.
+        /// other parameters. If one of these is tunable, so is the variable, and [`Model::update`](crate::Model::update)
+        /// computes it: this function also runs after a tunable parameter has changed. A calculated parameter depends
+        /// on all others unless it states them by [`Variable::initially`].
         calculated_parameter() causality = Causality::CalculatedParameter, variability = Variability::Fixed;
         /// Makes a local variable or output constant.
         constant() variability = Variability::Constant, initial = Some(Initial::Exact);

@@ -9,6 +9,24 @@ use fmu_description::{
     Variability,
 };
 
+/// Makes the calculated parameters tunable that depend on a tunable parameter, as FMI 2.0.5, section 2.2.7 demands.
+pub(super) fn tune_calculated_parameters(variables: &mut [Declaration]) {
+    let is_tunable = |variable: &&Declaration| {
+        variable.causality == Causality::Parameter && variable.variability == Variability::Tunable
+    };
+    let tunable: Vec<String> =
+        variables.iter().filter(is_tunable).map(|variable| variable.name.clone()).collect();
+    for variable in variables {
+        let depends = match &variable.initially {
+            Some(names) => names.iter().any(|name| tunable.contains(name)),
+            None => !tunable.is_empty(),
+        };
+        if variable.causality == Causality::CalculatedParameter && depends {
+            variable.variability = Variability::Tunable;
+        }
+    }
+}
+
 /// Describes time and the variables, with their units, types and dependencies. Types and value references of
 /// the variables are set later.
 pub(super) fn describe_variables(

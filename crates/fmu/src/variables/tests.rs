@@ -45,6 +45,8 @@ struct Everything {
     label: String,
     #[fmu(calculated_parameter)]
     inverse: f64,
+    #[fmu(calculated_parameter, initially(mass))]
+    double: f64,
     #[fmu(local, discrete, approximate, start = 3)]
     guess: f64,
     #[fmu(constant, display_unit = "deg", unit = "rad", start = 10.0 / 57.0)]
@@ -85,7 +87,8 @@ fn the_fields_are_the_variables_in_their_order() {
         description.variables.iter().map(|variable| variable.name.as_str()).collect();
     let expected = "time force[1] force[2] position[1] position[2] der(position[1]) \
                     der(position[2]) gain[1,1] gain[1,2] gain[2,1] gain[2,2] gain[3,1] gain[3,2] \
-                    table[1,1] table[2,1] mass mode count power enabled label inverse guess limit type";
+                    table[1,1] table[2,1] mass mode count power enabled label inverse double guess \
+                    limit type";
     assert_eq!(names, expected.split_whitespace().collect::<Vec<_>>());
     assert_eq!(description.problems(), []);
     assert_eq!(description.model_name, "Everything");
@@ -121,6 +124,8 @@ fn roles_types_and_attributes_are_described() {
     assert_eq!(find("enabled").kind, Kind::Boolean(Some(true)));
     assert_eq!(find("label").kind, Kind::String(Some("pump".to_owned())));
     assert_eq!(find("inverse").causality, Causality::CalculatedParameter);
+    assert_eq!(find("inverse").variability, Variability::Tunable);
+    assert_eq!(find("double").variability, Variability::Fixed);
     assert_eq!(find("guess").initial, Some(Initial::Approx));
     assert_eq!(find("guess").variability, Variability::Discrete);
     assert_eq!(find("limit").variability, Variability::Constant);
