@@ -107,8 +107,9 @@ pub fn variables(input: TokenStream) -> TokenStream {
 ///
 /// # Errors
 ///
-/// The macro refuses unknown and repeated arguments, arguments for a function that the block has, and a block
-/// that is not `impl Model for` a struct.
+/// The macro refuses unknown and repeated arguments, arguments for a function that the block has, event indicators
+/// without the function `event_indicators`, continuous states without the function `update`, and a block that is not
+/// `impl Model for` a struct.
 #[proc_macro_attribute]
 pub fn model(arguments: TokenStream, item: TokenStream) -> TokenStream {
     let arguments = parse_macro_input!(arguments as model::Arguments);

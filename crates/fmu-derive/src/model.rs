@@ -42,6 +42,16 @@ pub(crate) fn expand(arguments: &Arguments, mut block: ItemImpl) -> Result<Token
         return Err(Error::new_spanned(&block.self_ty, "expected `impl Model for` a struct"));
     }
     let present: Vec<String> = block.items.iter().filter_map(name).collect();
+    let has = |function: &str| present.iter().any(|name| name == function);
+    if let Some((argument, count)) = event_indicators(arguments)
+        && !has("event_indicators")
+        && quote!(#count).to_string() != "0"
+    {
+        let message = "expected the function `event_indicators`, which computes them";
+        return Err(Error::new(argument.span(), message));
+    }
+    let is_derived = !has("variables") && !has("model_exchange");
+    let check = (is_derived && !has("update")).then(|| derivatives_check(&block));
     for (item, argument) in items(arguments) {
         if !name(&item).is_some_and(|name| present.contains(&name)) {
             block.items.push(item);
@@ -50,7 +60,23 @@ pub(crate) fn expand(arguments: &Arguments, mut block: ItemImpl) -> Result<Token
             return Err(Error::new(argument.span(), message));
         }
     }
-    Ok(quote!(#block))
+    Ok(quote!(#block #check))
+}
+
+/// Returns the argument `event_indicators` with its value.
+fn event_indicators(arguments: &Arguments) -> Option<&(Ident, Expr)> {
+    arguments.0.iter().find(|(name, _)| name == "event_indicators")
+}
+
+/// Returns code that the compiler refuses if the struct of `block`, which has no function `update`, has states.
+fn derivatives_check(block: &ItemImpl) -> TokenStream {
+    let model = &block.self_ty;
+    quote! {
+        const _: () = ::core::assert!(
+            !<#model as ::fmu::Variables>::HAS_STATES,
+            "the model has continuous states: expected the function `update`, which computes their derivatives"
+        );
+    }
 }
 
 /// The name of a constant or a function; `None` for other items.
@@ -64,10 +90,9 @@ fn name(item: &ImplItem) -> Option<String> {
 
 /// All items that can be added, each with the first argument that the item uses, if any.
 fn items(arguments: &Arguments) -> Vec<(ImplItem, Option<Ident>)> {
-    let is_indicators = |(name, _): &&(Ident, Expr)| name == "event_indicators";
-    let indicators = arguments.0.iter().find(is_indicators);
+    let indicators = event_indicators(arguments);
     let experiment: Vec<_> =
-        arguments.0.iter().filter(|argument| !is_indicators(argument)).collect();
+        arguments.0.iter().filter(|(name, _)| name != "event_indicators").collect();
     let fields = experiment.iter().map(|(name, value)| quote!(#name: #value));
     let interface = if let Some((_, count)) = indicators {
         quote!(::core::option::Option::Some(::fmu::ModelExchange { event_indicators: #count }))

@@ -96,7 +96,14 @@ fn arguments_of_the_model_that_have_no_effect_are_refused() {
     assert!(message("", "impl M {}").contains("impl Model for"));
     let about = "impl Model for M { fn about(&self) -> About { todo() } }";
     assert!(message("stop_time = 1", about).contains("the block has the function"));
+    let missing = message("event_indicators = 1", "impl Model for M {}");
+    assert!(missing.contains("expected the function `event_indicators`"), "{missing}");
+    assert!(expand("event_indicators = 0", "impl Model for M {}").is_ok());
     let code = expand("", about).unwrap();
+    assert!(code.contains("expected the function `update`"), "{code}");
+    let update =
+        "impl Model for M { fn update(&mut self, _: f64) -> Result<(), Failure> { todo() } }";
+    assert!(!expand("", update).unwrap().contains("expected the function"));
     let count = |text: String| code.matches(&text).count();
     assert_eq!(count(quote!(fn about).to_string()), 1);
     assert_eq!(count(quote!(fn variables).to_string()), 1);
