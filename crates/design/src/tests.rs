@@ -574,6 +574,17 @@ fn a_list_of_noise_has_one_number_for_each_signal() {
 }
 
 #[test]
+fn false_alarms_in_every_sample_are_refused_with_the_entry() {
+    let entry = "[detection]\nmethod = \"cusum\"\nfalse_alarm_interval = 0.02\nnoise = 1\nsizes = { f_u1 = 1 }";
+    let message = read(&format!("sample_time = 0.1\n{MASS}{entry}\n"), |file| {
+        let error = detection(file, &design(file).unwrap(), None).err().unwrap();
+        error.to_string()
+    });
+    let expected = "`false_alarm_interval` or `false_alarms_per_hour`: a false alarm every 0.02 s is one every 0.2 samples";
+    assert!(message.clone().unwrap().contains(expected), "{message:?}");
+}
+
+#[test]
 fn faults_that_no_measurement_can_tell_apart_are_named_with_the_reason() {
     let two = MASS.replace("C = [[1, 0]]", "C = [[1, 0], [0, 1]]").replace("[-5,", "[-4, -5,");
     let of = |text: &str, f_a: &str, names: &[&str]| {

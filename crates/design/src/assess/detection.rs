@@ -16,6 +16,7 @@ use crate::plant::parameters::ParameterFamily;
 use crate::report::detection::{
     DecoupledInput, DetectedFault, Detection as Report, ParameterCases, Test,
 };
+use crate::report::number::rounded;
 use crate::solve::designed::Designed;
 use decoupling::Decoupling;
 use model_error::{LargestMean, ModelErrors};
@@ -150,13 +151,28 @@ impl<'a> Planner<'a> {
         count: usize,
     ) -> Result<PlannedTest, crate::Error> {
         let Self { file, request, problem, errors } = *self;
-        let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
         let bias = |rows: &DMatrix<f64>| match errors {
             Some(errors) => errors.largest_mean(decoupling, rows),
             None => Ok(LargestMean { mean: 0.0, interior_excess: None }),
         };
         #[expect(clippy::cast_precision_loss, reason = "a number of faults")]
         let samples = request.false_alarm_interval * count as f64 / problem.period;
+        let refuse = |error: control::Error| {
+            let message = match error {
+                control::Error::OutOfRange { value, rule, .. }
+                    if value.to_bits() == samples.to_bits() =>
+                {
+                    format!(
+                        "`false_alarm_interval` or `false_alarms_per_hour`: a false alarm every {} s is one every {} \
+                         samples of each test, expected {rule}",
+                        rounded(request.false_alarm_interval),
+                        rounded(samples),
+                    )
+                }
+                error => error.to_string(),
+            };
+            file.error_at(&request.place, message)
+        };
         let name = match faults {
             [fault] => problem.names[problem.fault_at(*fault)].clone(),
             _ => "all".to_owned(),
