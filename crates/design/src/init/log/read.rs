@@ -224,14 +224,22 @@ impl Columns<'_> {
     }
 }
 
-/// Returns the length in s of a unit, 1 for other names of the second and for `-`; None for a unit of another quantity.
+/// Returns the length in s of a unit or of a word for it, 1 for `-`; None for a unit of another quantity.
 fn seconds(unit: &str) -> Option<f64> {
-    if ["sec", "secs", "second", "seconds", "-"].contains(&unit.to_lowercase().as_str()) {
-        return Some(1.0);
-    }
-    let second = BaseUnit { s: 1, ..BaseUnit::default() };
-    let (factor, _) = Unit::parse(unit).ok()?.base?.conversion(&second)?;
-    Some(factor)
+    let length = match unit.to_lowercase().as_str() {
+        "sec" | "secs" | "second" | "seconds" | "-" => 1.0,
+        "msec" | "msecs" | "millis" | "millisecond" | "milliseconds" => 1e-3,
+        "usec" | "usecs" | "micros" | "microsecond" | "microseconds" => 1e-6,
+        "nsec" | "nsecs" | "nanos" | "nanosecond" | "nanoseconds" => 1e-9,
+        "mins" | "minute" | "minutes" => 60.0,
+        "hr" | "hrs" | "hour" | "hours" => 3600.0,
+        "day" | "days" => 86_400.0,
+        _ => {
+            let second = BaseUnit { s: 1, ..BaseUnit::default() };
+            Unit::parse(unit).ok()?.base?.conversion(&second)?.0
+        }
+    };
+    Some(length)
 }
 
 /// Returns the words of a name, `time` and `ms` of `time (ms)`.
@@ -282,6 +290,8 @@ mod tests {
             ("ms", Some(0.001)),
             ("Time (s)", Some(1.0)),
             ("t/h", Some(3600.0)),
+            ("time_minutes", Some(60.0)),
+            ("Time (Milliseconds)", Some(0.001)),
             ("time", None),
             ("t", None),
             ("Ts", None),
@@ -302,6 +312,8 @@ mod tests {
             ("-", Some(1.0)),
             ("ms", Some(0.001)),
             ("h", Some(3600.0)),
+            ("hours", Some(3600.0)),
+            ("usec", Some(1e-6)),
             ("K", None),
             ("samples", None),
         ] {
