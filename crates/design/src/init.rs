@@ -49,7 +49,7 @@ pub fn new_plant_file(
     out: &Path,
     limits: &TimeLimits,
 ) -> Result<NewPlantFile, Error> {
-    let draft = draft(sources, options, out)?;
+    let draft = draft(sources, options, out)?.without_unknown_units();
     let warnings = draft.identification.warnings.clone();
     let budget = limits.of_gains();
     let mut refusal = None;

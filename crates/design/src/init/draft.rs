@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use fmu_description::unit::Unit;
 use nalgebra::DMatrix;
 use plant_file::signals::Signal;
 
@@ -65,6 +66,25 @@ pub(super) struct Bandwidths {
 }
 
 impl Draft {
+    /// Removes units that FMI does not know, which a plant file cannot state; each is a warning.
+    pub(super) fn without_unknown_units(mut self) -> Self {
+        let Self { model, actuators, measurements, identification, .. } = &mut self;
+        let states: &mut [Signal] = match model {
+            Model::Matrices { states, .. } => states,
+            Model::Fmu { .. } => &mut [],
+        };
+        for signal in states.iter_mut().chain(actuators).chain(measurements) {
+            let Some(Err(error)) = signal.unit.as_deref().map(Unit::parse) else { continue };
+            signal.unit = None;
+            let warning = format!("the unit of {} is left out: {error}", signal.name);
+            // A state and a measurement may be one signal.
+            if !identification.warnings.contains(&warning) {
+                identification.warnings.push(warning);
+            }
+        }
+        self
+    }
+
     /// Returns the plant file. `refusal`: the lines that say why no controller was found; empty if one was found.
     pub(super) fn text(&self, settings: &Settings, refusal: &[&str]) -> String {
         let mut text = format!(

@@ -185,6 +185,19 @@ mod tests {
     }
 
     #[test]
+    fn a_unit_that_fmi_does_not_know_is_left_out_with_a_warning() {
+        let text = ",x [m],u [N]\nx,-1,1\ny [furlong],1,0\n";
+        let draft = table(text, "plant.csv").unwrap().without_unknown_units();
+        assert_eq!(draft.actuators[0].unit.as_deref(), Some("N"));
+        assert_eq!(draft.measurements[0].unit, None);
+        let warnings = draft.identification.warnings;
+        assert!(
+            warnings[0].starts_with("the unit of y is left out: unit \"furlong\""),
+            "{warnings:?}"
+        );
+    }
+
+    #[test]
     fn an_index_is_no_unit_and_an_apostrophe_around_a_name_no_derivative() {
         for (cell, name, unit) in [
             ("q[2]", "q[2]", None),
