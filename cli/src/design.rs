@@ -220,7 +220,8 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         staged.stage(path, |path| fs::write(path, text))?;
     }
     staged.commit()?;
-    for warning in &code.warnings {
+    let of_filter = options.kalman_fmu.as_ref().and_then(|_| design.kalman_warning());
+    for warning in code.warnings.iter().chain(&of_filter) {
         eprintln!("warning: {warning}");
     }
     if options.json {

@@ -24,6 +24,15 @@ use plant_file::signals::joined;
 const RESOLUTION: f64 = 0.2;
 /// Largest number of integration steps of the filter in one sample.
 const MOST_STEPS: f64 = 1e4;
+/// Ratio of the assumed and the stated noise of a measurement above which it is a warning.
+const NOTICEABLE: f64 = 2.0;
+
+/// The Kalman filter of a design.
+pub(crate) struct KalmanFilter {
+    pub(crate) design: KalmanDesign,
+    /// Why the filter assumes another noise than the file states, if it does.
+    pub(crate) warning: Option<PlaceError>,
+}
 
 /// Returns the Kalman filter for the plant of `file`, for the noise of the designed observer; `stop_time`: of its
 /// default experiment, in s.
@@ -36,7 +45,7 @@ pub(crate) fn kalman_design(
     file: &PlantFile<'_>,
     designed: &Designed,
     stop_time: f64,
-) -> Result<KalmanDesign, PlaceError> {
+) -> Result<KalmanFilter, PlaceError> {
     let Solution { linear, extended, domain, observer, .. } = &designed.nominal;
     let refuse = |keys: &[&'static str], text: &str| {
         Err(file.error(keys, format!("no Kalman filter with the plant's FMU: {text}")))
@@ -109,7 +118,7 @@ pub(crate) fn kalman_design(
     #[expect(clippy::cast_possible_truncation, reason = "from 1 to MOST_STEPS")]
     let integration_steps = steps.clamp(1.0, MOST_STEPS) as i32;
     let covariance = &noise.measurements * scale;
-    Ok(KalmanDesign {
+    let design = KalmanDesign {
         description: description(linear, &covariance),
         sample_time: period,
         integration_steps,
@@ -122,22 +131,58 @@ pub(crate) fn kalman_design(
         measurements: signals(&linear.measurements),
         faults: faults.collect(),
         states,
-    })
+    };
+    let warning = noise_warning(file, &linear.measurements, noise, &covariance);
+    Ok(KalmanFilter { design, warning })
+}
+
+/// Returns the warning of measurements whose assumed standard deviation and stated noise differ by more than a factor
+/// of [`NOTICEABLE`]; None if there are none, or if the file states the covariances.
+fn noise_warning(
+    file: &PlantFile<'_>,
+    measurements: &[PlantSignal],
+    noise: &Noise,
+    covariance: &DMatrix<f64>,
+) -> Option<PlaceError> {
+    let variances = covariance.diagonal();
+    let pairs = variances.iter().map(|variance| variance.sqrt()).zip(&file.robustness.noise);
+    let differs = |assumed: f64, stated: f64| {
+        let ratio = assumed / stated;
+        noise.is_relative && ratio.max(1.0 / ratio) > NOTICEABLE
+    };
+    let differing = measurements.iter().zip(pairs).filter_map(|(signal, (assumed, &stated))| {
+        let text = || format!("{} in place of {}", deviation(signal, assumed), rounded(stated));
+        differs(assumed, stated).then(text)
+    });
+    let differing: Vec<_> = differing.collect();
+    let message = || {
+        format!(
+            "the Kalman filter assumes other standard deviations than `robustness.noise`, {}, because a bandwidth sets their \
+             ratios: its `x_deviation`, `f_deviation` and `innovation_squared` are for these; `observer.W` and \
+             `observer.V` state the noise of each sensor",
+            differing.join(", ")
+        )
+    };
+    (!differing.is_empty()).then(|| file.error(&["observer"], message()))
 }
 
 /// Returns the description of the filter of the plant `linear`, with the noise of the measurements that it assumes.
 fn description(linear: &LinearPlant, covariance: &DMatrix<f64>) -> String {
     let faults = joined(linear.faults.iter().map(|fault| fault.name.as_str()));
     let variances = covariance.diagonal();
-    let deviations = linear.measurements.iter().zip(&variances).map(|(signal, variance)| {
-        let unit = signal.unit.as_deref().map(|unit| format!(" {unit}")).unwrap_or_default();
-        format!("{} {}{unit}", signal.name, rounded(variance.sqrt()))
-    });
-    let deviations: Vec<_> = deviations.collect();
+    let deviations = linear.measurements.iter().zip(&variances);
+    let deviations: Vec<_> =
+        deviations.map(|(signal, variance)| deviation(signal, variance.sqrt())).collect();
     format!(
         "Kalman filter that estimates the states of its plant and {faults}; assumed standard deviations: {}",
         deviations.join(", ")
     )
+}
+
+/// Returns name, standard deviation and unit of a measurement.
+fn deviation(signal: &PlantSignal, deviation: f64) -> String {
+    let unit = signal.unit.as_deref().map(|unit| format!(" {unit}")).unwrap_or_default();
+    format!("{} {}{unit}", signal.name, rounded(deviation))
 }
 
 /// Returns the factor of the covariances with which the variances of the measurements agree with the variances in the
@@ -159,6 +204,7 @@ fn scale(file: &PlantFile<'_>, noise: &Noise) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::tests::read;
+    use nalgebra::DVector;
 
     /// The factor for a measurement with this noise, of the relative variance 4.
     fn factor(stated: &str) -> Option<f64> {
@@ -168,6 +214,28 @@ mod tests {
         let noise =
             Noise { process: one.clone(), measurements: four, covariance: one, is_relative: true };
         read(&format!("{text}{stated}\n"), |file| scale(file, &noise)).unwrap()
+    }
+
+    #[test]
+    fn an_assumed_noise_of_more_than_twice_the_stated_one_is_a_warning() {
+        let text = "A = [[-1]]\nB = [[1]]\nC = [[1], [1]]\nactuator_faults = \"all\"\nobserver.bandwidth = 1\n\
+                    robustness.noise = [2, 2]\n";
+        let measurements = ["y1", "y2"].map(|name| PlantSignal::named(name.to_owned()));
+        let warning = |variances: [f64; 2], is_relative| {
+            let one = DMatrix::from_element(1, 1, 1.0);
+            let covariance = DMatrix::from_diagonal(&DVector::from_row_slice(&variances));
+            let (process, measured) = (one.clone(), covariance.clone());
+            let noise = Noise { process, measurements: measured, covariance: one, is_relative };
+            let warning = read(text, |file| {
+                noise_warning(file, &measurements, &noise, &covariance)
+                    .map(|warning| warning.to_string())
+            });
+            warning.unwrap().unwrap_or_default()
+        };
+        assert!(warning([4.0, 0.25], true).contains("`robustness.noise`, y2 0.5 in place of 2,"));
+        assert!(warning([25.0, 4.0], true).contains("`robustness.noise`, y1 5 in place of 2,"));
+        assert_eq!(warning([9.0, 2.0], true), "");
+        assert_eq!(warning([25.0, 0.25], false), "");
     }
 
     #[test]

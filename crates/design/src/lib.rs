@@ -29,7 +29,6 @@ mod threads;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use aso_controller::kalman::KalmanDesign;
 use control::robustness::Loop;
 use files::{PlaceError, Source};
 
@@ -49,6 +48,7 @@ pub use report::robustness::Level;
 use assess::reporting::Assessment;
 use assess::{bandwidths, detection, reporting, worst_case};
 use designed_fmu::Content;
+use kalman_fmu::KalmanFilter;
 use plant::parameters::ParameterFamily;
 use plant_file::PlantFile;
 use plant_file::signals::joined;
@@ -77,7 +77,7 @@ pub struct Design {
     /// The text of the plant file.
     pub plant: String,
     /// The Kalman filter with the plant's FMU, or why there is none.
-    kalman: Result<KalmanDesign, PlaceError>,
+    kalman: Result<KalmanFilter, PlaceError>,
 }
 
 /// Designs the controller that the plant file at `path` asks for.
@@ -219,16 +219,23 @@ impl Design {
     /// follows from no noise; the FMU of the plant cannot be read; `base` is no packed Kalman filter, or its library
     /// refuses the design.
     pub fn kalman_fmu(&self, base: &Path) -> Result<DesignedFmu, Error> {
-        let (Ok(design), Some(model)) = (&self.kalman, &self.model) else {
+        let (Ok(filter), Some(model)) = (&self.kalman, &self.model) else {
             let refusal = self.kalman.as_ref().err().cloned();
             return Err(refusal.map_or_else(|| Error::Invalid("no plant".to_owned()), Error::from));
         };
-        let text = design.to_toml().map_err(|error| Error::Invalid(error.to_string()))?;
+        let text = filter.design.to_toml().map_err(|error| Error::Invalid(error.to_string()))?;
         let text = format!("{}\n{text}", identity::heading(&self.identity, &self.report.verdict));
         let plant = fs::read(model).map_err(Error::file("read", model))?;
         let resources = [("filter.toml", text.as_bytes()), ("plant.fmu", &plant)];
         let content = Content { model: "KalmanFilter", resources: &resources, plant: &self.plant };
         DesignedFmu::new(base, &content)
+    }
+
+    /// Returns the warning of [`Design::kalman_fmu`], of measurements for which the filter assumes another noise than the
+    /// plant file states.
+    #[must_use]
+    pub fn kalman_warning(&self) -> Option<String> {
+        self.kalman.as_ref().ok()?.warning.as_ref().map(ToString::to_string)
     }
 
     /// Returns the report as an HTML page that needs no other file.
