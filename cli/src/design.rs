@@ -302,7 +302,10 @@ fn init(options: &Options) -> anyhow::Result<()> {
         outputs: options.outputs.clone(),
         order: options.order,
     };
-    let file = design::new_plant_file(&sources, &log, &out, &limits)?;
+    let file = {
+        let progress = Reporter::new();
+        design::new_plant_file(&sources, &log, &out, &limits, &|step| progress.show(step))?
+    };
     let mut staged = Outputs::default();
     staged.stage(&out, |path| fs::write(path, &file.text))?;
     staged.commit()?;

@@ -72,7 +72,7 @@ pub(crate) fn identify(
     let options = LogOptions { inputs, outputs, order };
     let limits = TimeLimits::default();
     let path = Path::new("plant.toml");
-    let new = detached(py, || new_plant_file(&paths, &options, path, &limits))?;
+    let new = detached(py, || new_plant_file(&paths, &options, path, &limits, &|_| {}))?;
     Ok((new.text, new.refusal, new.warnings))
 }
 

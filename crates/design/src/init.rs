@@ -13,6 +13,7 @@ use files::Source;
 use crate::Error;
 use crate::assess::bandwidths;
 use crate::budget::{Budget, TimeLimits};
+use crate::progress::{Observer, Progress};
 use draft::{Bandwidths, Draft, Settings};
 use plant_file::PlantFile;
 
@@ -38,7 +39,7 @@ pub struct NewPlantFile {
 ///
 /// The faults are those of all actuators, or of as many as the measurements can tell apart. Feedback and observer have
 /// the bandwidths that a design without requirements would have. If no controller is found, the file has the faults of
-/// all actuators and no bandwidths, and states the reason.
+/// all actuators and no bandwidths, and states the reason. `observer` is called when a step begins.
 ///
 /// # Errors
 ///
@@ -48,10 +49,13 @@ pub fn new_plant_file(
     options: &LogOptions,
     out: &Path,
     limits: &TimeLimits,
+    observer: &Observer<'_>,
 ) -> Result<NewPlantFile, Error> {
+    observer(Progress { step: "plant", done: 0.0 });
     let draft = draft(sources, options, out)?.without_unknown_units();
     let warnings = draft.identification.warnings.clone();
     let budget = limits.of_gains();
+    observer(Progress { step: "bandwidths", done: 0.5 });
     let mut refusal = None;
     for settings in attempts(&draft) {
         let text = draft.text(&settings, &[]);
