@@ -6,7 +6,7 @@ use fmu_description::{CoSimulation, LogCategory, ModelDescription, ModelExchange
 
 /// Log categories of every exported FMU, with the standardised names of section 2.2.4.
 const CATEGORIES: [(&str, &str); 4] = [
-    ("logEvents", "Events at which the model wants the simulation to end"),
+    ("logEvents", "Events of the model, such as one at which it wants the simulation to end"),
     ("logStatusDiscard", "Calls that were refused without harm"),
     ("logStatusError", "Calls that failed; the instance has to be reset or restored"),
     ("logStatusFatal", "Calls after which the instance is lost"),
