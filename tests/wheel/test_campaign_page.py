@@ -3,6 +3,7 @@
 import base64
 import html.parser
 import json
+import re
 import shutil
 import subprocess
 import time
@@ -181,7 +182,7 @@ def test_the_page_opens_on_the_answer(tmp_path):
     document = page(outcome, tmp_path / "p.html")
     failed = int((a - b / 4 >= 0.5).sum())
     assert f"{failed:,} of 5,000 runs ({100 * failed / 5000:.3g} %) fail: y is not below 0.5." in document.text
-    assert "a decides most: rank correlation with y 0.9" in document.text and "; next b, -0.2" in document.text
+    assert "a decides most: rank correlation with y 0.9" in document.text and "; next b, rank correlation with y -0.2" in document.text
     assert ("option", {"value": "1", "selected": None}) in document.tags
     assert document.text.index("fail: y is not below") < document.text.index("What was run")
     border = document.data["border"]
@@ -191,6 +192,24 @@ def test_the_page_opens_on_the_answer(tmp_path):
         crossing = np.interp(0.5, row, surface["x"])
         assert crossing == pytest.approx(0.5 + along / 4, abs=0.02)
     assert surface["wrong"] < 0.01 and len(document.source) < 2e6
+
+
+def test_the_answer_weighs_texts_and_does_not_take_chance_for_evidence(tmp_path):
+    generator = np.random.default_rng(5)
+    kind = np.array(["stuck", "gain", "bias"] * 6, dtype=object)
+    numbers = {name: generator.random(18) for name in ("from", "size", "mass", "rate")}
+    values = {"y": np.where((kind == "stuck") & (np.arange(18) < 12), 2.0, generator.random(18))}
+
+    def answer(name, columns):
+        outcome = write(tmp_path / name, {"method": "random"}, columns, values, limits={"y": {"below": 1.0}})
+        return page(outcome, tmp_path / f"{name}.html").text
+
+    assert "No parameter decides visibly: the strongest is" in answer("c", numbers)
+    text = answer("d", {**numbers, "kind": kind})
+    # Four failures fall into the same one of three kinds by chance with p = 3 C(6, 4) / C(18, 4).
+    stated = re.search(r"kind perhaps decides most: failures from 66.7 % with stuck to 0 % with \w+, p = ([\d.]+)", text)
+    assert stated and float(stated[1]) == pytest.approx(3 * 15 / 3060, abs=0.004)
+    assert "kind decides most" in answer("e", {"kind": kind})
 
 
 def test_of_few_failures_no_surface_is_fitted(tmp_path):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._errors import ConfigurationError, ResultsError
-from ._analysis import batches, describe
+from ._analysis import batches, describe, evidence
 from ._border import border
 from ._packages import package
 
@@ -28,8 +28,9 @@ __all__ = ["write"]
 _MARK = '<meta name="generator" content="aso-ftc campaign">'
 _POINTS = 10_000
 _ROWS = 50
-# The rank correlation from which on a parameter decides.
+# The strength from which on a parameter decides, and the p-value below which it does so beyond chance.
 _DECISIVE = 0.3
+_CHANCE = 0.05
 _BINS = 60
 # An axis of positive values is logarithmic if the largest is above the median by this factor, or the median
 # above the lowest hundredth by twice this factor.
@@ -175,7 +176,7 @@ def _numbers(values: Iterable[float]) -> list[float | None]:
 
 
 def _answer(outcome: Outcome, opened: str) -> str:
-    """How many runs fail, and which parameter decides."""
+    """How many runs fail, and which parameter decides on what evidence."""
     total, lost = len(outcome), int(outcome.unfinished.sum())
     lines = []
     for name in outcome.limits:
@@ -194,16 +195,43 @@ def _answer(outcome: Outcome, opened: str) -> str:
     if not outcome.limits:
         lines.append(f"{_share(lost, total)} did not finish. The campaign has no limits, so that nothing else fails.")
     if outcome.inputs and opened:
-        influence = outcome.influence(opened)
-        numeric = influence[influence["correlation"].notna()]["correlation"]
-        if len(numeric):
-            strongest = f"rank correlation with {opened} {numeric.iloc[0]:.2f}"
-            decides = abs(numeric.iloc[0]) >= _DECISIVE
-            text = f"{numeric.index[0]} decides most: {strongest}" if decides else "No parameter decides alone"
-            text += "" if decides else f": the strongest is {numeric.index[0]}, {strongest}"
-            text += f"; next {numeric.index[1]}, {numeric.iloc[1]:.2f}." if len(numeric) > 1 else "."
-            lines.append(text)
+        lines += _evidence(outcome, opened)
     return '<div class="answer">' + "".join(f"<p>{escape(line)}</p>" for line in lines) + "</div>"
+
+
+def _evidence(outcome: Outcome, measure: str) -> list[str]:
+    """Which parameter decides, and how strong the evidence is."""
+    influence = outcome.influence(measure)
+    ranked = evidence(outcome, influence, measure)
+    if not ranked:
+        return []
+    limited = measure in outcome.limits and len(set(influence["failed"])) > 1
+
+    def facts(name: str) -> str:
+        rows = influence.loc[[name]]
+        if outcome.inputs[name]:
+            return f"rank correlation with {measure} {rows['correlation'].iloc[0]:.2f}"
+        word = "failed" if limited else "median"
+        ends = rows.sort_values(word, ascending=False, kind="stable").iloc[[0, -1]].to_dict("records")
+        shown = [f"{100 * row[word]:.3g} %" if limited else f"{row[word]:.3g}" for row in ends]
+        texts = [f"{text} with {row['value'] or '(none)'}" for text, row in zip(shown, ends)]
+        return f"{'failures' if limited else f'median of {measure}'} from {texts[0]} to {texts[1]}"
+
+    name, strength, p = ranked[0]
+    reason = f"{facts(name)}, {_chance(p)}"
+    if strength >= _DECISIVE and p * len(ranked) < _CHANCE:
+        text = f"{name} decides most: {reason}"
+    elif strength >= _DECISIVE and p < _CHANCE:
+        text = f"{name} perhaps decides most: {reason}, the least of {len(ranked)} parameters"
+    else:
+        text = f"No parameter decides visibly: the strongest is {name}, {reason}"
+    if len(ranked) > 1:
+        text += f"; next {ranked[1][0]}, {facts(ranked[1][0])}, {_chance(ranked[1][2])}"
+    return [text + "."]
+
+
+def _chance(p: float) -> str:
+    return f"p = {p:.2g}" if p >= 1e-3 else "p < 0.001"
 
 
 def _share(count: int, total: int) -> str:
