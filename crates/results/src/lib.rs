@@ -227,7 +227,10 @@ pub enum ResultsError {
         text: String,
     },
     /// A time is earlier than the time of the row before.
-    #[error("{}, {place}: {name} is {time} after {before}, expected times that do not decrease", path.display())]
+    #[error(
+        "{}, {place}: {name} is {time} after {before}, expected times that do not decrease{hint}",
+        path.display()
+    )]
     Order {
         /// Path of the file.
         path: PathBuf,
@@ -239,6 +242,8 @@ pub enum ResultsError {
         time: f64,
         /// The time of the row before, in s.
         before: f64,
+        /// Says if the column is the time because it is the first one; otherwise empty.
+        hint: &'static str,
     },
     /// A column contains texts; numbers are required.
     #[error("{}: {name} holds texts, expected numbers", path.display())]

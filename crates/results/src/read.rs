@@ -67,7 +67,8 @@ impl Table {
     /// Columns of MAT files have the type Real, integers of Parquet the type Integer, also integers with 64
     /// bits; decimals and timestamps (in s) of Parquet have the type Real. Columns of CSV have the type Boolean or
     /// Integer if the first 1000 rows have only such values and, for an Integer, the file has a Real such as `0.0`;
-    /// they have no unit, unless the second line of the file states units.
+    /// they have no unit, unless the second line of the file states units. Dates of ISO 8601 in the time column of
+    /// CSV are in s since 1970.
     #[must_use]
     pub fn columns(&self) -> &[Column] {
         &self.columns
@@ -160,16 +161,24 @@ impl Table {
     }
 }
 
-/// Returns the position of the time: the column `time`, otherwise that name in another case, otherwise `t`, otherwise
-/// the first. The names may have `[s]` behind them.
+/// The reason why the first column is the time, for messages.
+const FIRST: &str = " (no column is called time or t, so the first one is the time)";
+
+/// Returns the position of the time: the column of [`named_time`], otherwise the first.
 fn time_position(columns: &[Column]) -> usize {
+    named_time(columns).unwrap_or(0)
+}
+
+/// Returns the position of the column `time`, otherwise of that name in another case, otherwise of `t`. The names may
+/// have `[s]` behind them.
+fn named_time(columns: &[Column]) -> Option<usize> {
     fn plain(column: &Column) -> &str {
         column.name.strip_suffix("[s]").map_or(column.name.as_str(), str::trim_end)
     }
     let exact = |name: &str| columns.iter().position(|column| plain(column) == name);
     let similar =
         || columns.iter().position(|column| plain(column).eq_ignore_ascii_case(super::TIME));
-    exact(super::TIME).or_else(similar).or_else(|| exact("t")).unwrap_or(0)
+    exact(super::TIME).or_else(similar).or_else(|| exact("t"))
 }
 
 fn unreadable(path: &Path, reason: &impl ToString) -> ResultsError {
@@ -181,19 +190,31 @@ struct Clock<'a> {
     path: &'a Path,
     /// Name of the time column.
     name: &'a str,
+    /// Says that the first column is the time for want of a better one; otherwise empty.
+    hint: &'static str,
     before: f64,
 }
 
 impl<'a> Clock<'a> {
-    fn new(path: &'a Path, name: &'a str) -> Self {
-        Self { path, name, before: f64::NEG_INFINITY }
+    fn new(path: &'a Path, columns: &'a [Column], time: usize) -> Self {
+        let hint = if named_time(columns).is_some() { "" } else { FIRST };
+        Self { path, name: &columns[time].name, hint, before: f64::NEG_INFINITY }
+    }
+
+    /// Says that a text in the time column is no time.
+    fn refusal(&self, text: &str) -> String {
+        let Self { name, hint, .. } = self;
+        format!(
+            "{name} is {text:?}, expected a time in s or a date of ISO 8601, such as 2026-12-01 08:00:00{hint}"
+        )
     }
 
     /// Checks the next time; `place` returns its line or row for the error.
     fn check(&mut self, time: f64, place: impl Fn() -> String) -> Result<(), ResultsError> {
         if !time.is_finite() {
             let actual = if time.is_nan() { "no number" } else { "infinite" };
-            let reason = format!("{}: {} is {actual}, expected a time in s", place(), self.name);
+            let Self { name, hint, .. } = self;
+            let reason = format!("{}: {name} is {actual}, expected a time in s{hint}", place());
             return Err(unreadable(self.path, &reason));
         }
         if time >= self.before {
@@ -206,6 +227,7 @@ impl<'a> Clock<'a> {
             name: self.name.to_owned(),
             time,
             before: self.before,
+            hint: self.hint,
         })
     }
 }

@@ -74,7 +74,7 @@ pub(super) fn visit(
     }
     let reader = open(path)?;
     let length = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?.len();
-    let mut clock = Clock::new(path, &columns[positions[0]].name);
+    let mut clock = Clock::new(path, columns, positions[0]);
     let (mut number, mut order) = (0_u64, Ok(()));
     for group in 0..reader.num_row_groups() {
         let mut visit = |time: f64, row: &[f64]| {

@@ -5,6 +5,7 @@ use std::io::{BufRead as _, BufReader, Cursor, Read, Seek as _, SeekFrom};
 use std::path::Path;
 
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
+use chrono::{DateTime, NaiveDate, NaiveDateTime, NaiveTime};
 
 use super::{Clock, Column, ResultsError, Visitor, time_position, unreadable};
 use crate::ColumnKind;
@@ -13,6 +14,8 @@ use crate::ColumnKind;
 const BUFFER: usize = 256 * 1024;
 /// Number of bytes at the start of a file that are examined to tell a text from a binary file.
 const SNIFFED: usize = 1024;
+/// The characters that may separate the values of a line.
+const DELIMITERS: [u8; 3] = [b';', b'\t', b','];
 /// Largest number of rows at the start of a file from which the types of its columns are taken.
 const TYPED: usize = 1000;
 
@@ -61,18 +64,27 @@ fn reader(path: &Path, delimiter: u8) -> Result<Reader<Box<dyn Read>>, ResultsEr
     Ok(builder.from_reader(open(path)?))
 }
 
-/// Returns the character between the names in the first line: a semicolon or a tab if there is one outside of
-/// quotes, otherwise a comma.
+/// Returns the character between the names in the first line: the first of semicolon, tab and comma that the second
+/// line has as often outside of quotes, otherwise the first one that there is.
 fn delimiter(path: &Path) -> Result<u8, ResultsError> {
-    let mut line = Vec::new();
-    let mut text = BufReader::new(open(path)?).take(BUFFER as u64);
-    text.read_until(b'\n', &mut line).map_err(|error| unreadable(path, &error))?;
-    let mut is_quoted = false;
-    line.retain(|byte| {
-        is_quoted ^= *byte == b'"';
-        !is_quoted
-    });
-    Ok([b';', b'\t'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b','))
+    let mut text = BufReader::new(open(path)?).take(2 * BUFFER as u64);
+    let mut counts = [[0; 3]; 2];
+    for counts in &mut counts {
+        let mut line = Vec::new();
+        text.read_until(b'\n', &mut line).map_err(|error| unreadable(path, &error))?;
+        let mut is_quoted = false;
+        for byte in line {
+            is_quoted ^= byte == b'"';
+            let place = DELIMITERS.iter().position(|sign| *sign == byte && !is_quoted);
+            if let Some(place) = place {
+                counts[place] += 1;
+            }
+        }
+    }
+    let present = |place: &usize| counts[0][*place] > 0;
+    let equal = |place: &usize| present(place) && counts[0][*place] == counts[1][*place];
+    let place = (0..3).find(equal).or_else(|| (0..3).find(present));
+    Ok(place.map_or(b',', |place| DELIMITERS[place]))
 }
 
 pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError> {
@@ -174,7 +186,7 @@ pub(super) fn visit(
     let mut reader = reader(path, layout.delimiter)?;
     let mut record = ByteRecord::new();
     let mut row = vec![0.0; positions.len()];
-    let mut clock = Clock::new(path, &columns[positions[0]].name);
+    let mut clock = Clock::new(path, columns, positions[0]);
     if layout.has_units {
         reader.read_byte_record(&mut record).map_err(|error| unreadable(path, &error))?;
     }
@@ -196,14 +208,20 @@ pub(super) fn visit(
         }
         for (value, position) in row.iter_mut().zip(positions) {
             let cell = &record[*position];
-            let parsed = number(cell, layout.delimiter).ok_or_else(|| ResultsError::Number {
-                path: path.to_owned(),
-                line: line(),
-                name: columns[*position].name.clone(),
-                text: String::from_utf8_lossy(cell).into_owned(),
+            let is_time = *position == positions[0];
+            let parse = |cell: &[u8]| {
+                number(cell, layout.delimiter).or_else(|| date(cell).filter(|_| is_time))
+            };
+            let parsed = parse(cell).ok_or_else(|| {
+                let text = String::from_utf8_lossy(cell).into_owned();
+                if is_time {
+                    return unreadable(path, &format!("line {}: {}", line(), clock.refusal(&text)));
+                }
+                let name = columns[*position].name.clone();
+                ResultsError::Number { path: path.to_owned(), line: line(), name, text }
             });
             // A line is cut in its last cell.
-            let continued = || number(&[cell, b"0"].concat(), layout.delimiter);
+            let continued = || parse(&[cell, b"0"].concat());
             match parsed {
                 Ok(parsed) => *value = parsed,
                 Err(error) if *position + 1 == record.len() && continued().is_some() => {
@@ -261,6 +279,20 @@ fn is_ended(path: &Path) -> bool {
     };
     // In UTF-16 the character is in one of two bytes.
     File::open(path).and_then(read).is_ok() && (end[1] == b'\n' || end == [b'\n', 0])
+}
+
+/// Parses a date of ISO 8601, with or without a time of day; returns the time in s since 1970, in UTC unless the
+/// text states another offset.
+fn date(cell: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(cell).ok()?.trim().replacen(' ', "T", 1);
+    let utc = DateTime::parse_from_str(&text, "%Y-%m-%dT%H:%M:%S%.f%#z")
+        .map(|time| time.to_utc())
+        .or_else(|_| text.parse::<NaiveDateTime>().map(|time| time.and_utc()))
+        .or_else(|_| text.parse::<NaiveDate>().map(|day| day.and_time(NaiveTime::MIN).and_utc()))
+        .ok()?;
+    #[expect(clippy::cast_precision_loss, reason = "beyond 2^53 µs a time in s has fewer digits")]
+    let micros = utc.timestamp_micros() as f64;
+    Some(micros / 1e6)
 }
 
 /// Parses a number or a Boolean; an empty cell is NaN, another text `None`. If the values are not separated by

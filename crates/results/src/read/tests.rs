@@ -157,6 +157,57 @@ fn layouts_of_other_programs_are_read() {
     }
 }
 
+/// `date -u -d TEXT +%s`.
+#[test]
+fn dates_in_the_time_column_are_seconds_since_1970() {
+    let folder = tempfile::tempdir().unwrap();
+    for (first, second, expected) in [
+        ("2023-11-14 22:13:20.250", "2023-11-14 22:13:20.500", [1_700_000_000.25, 1_700_000_000.5]),
+        ("2023-11-14T22:13:20Z", "2023-11-14T22:13:21Z", [1_700_000_000.0, 1_700_000_001.0]),
+        (
+            "2023-11-14 23:13:20+01:00",
+            "2023-11-14 22:13:21+0000",
+            [1_700_000_000.0, 1_700_000_001.0],
+        ),
+        ("1969-12-31", "1970-01-02", [-86_400.0, 86_400.0]),
+    ] {
+        let text = format!("time,x\n{first},1\n{second},2\n");
+        let table = written(folder.path(), "a.csv", &text);
+        assert_eq!(table.column(0).unwrap(), expected, "{first}");
+        let refused = written(folder.path(), "b.csv", &format!("time,x\n0,{first}\n"));
+        assert!(refused.column(1).unwrap_err().to_string().contains("expected a number"));
+    }
+    let refused = written(folder.path(), "c.csv", "time,x\n14.11.2023 22:13,1\n").column(1);
+    let message = refused.unwrap_err().to_string();
+    assert!(
+        message.contains("line 2: time is \"14.11.2023 22:13\", expected a time in s or a date")
+    );
+}
+
+#[test]
+fn a_first_column_that_is_the_time_for_want_of_a_name_is_announced() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "a,b\n1,2\n0.5,3\n";
+    let refused = written(folder.path(), "a.csv", text).column(1).unwrap_err().to_string();
+    assert!(
+        refused.contains("line 3: a is 0.5 after 1") && refused.contains("first one is the time")
+    );
+}
+
+#[test]
+fn a_tab_or_semicolon_in_a_name_separates_no_values() {
+    let folder = tempfile::tempdir().unwrap();
+    for (text, name) in [
+        ("time,a\tb\n0,1\n", "a\tb"),
+        ("time,a;b\n0,1\n", "a;b"),
+        ("time;q[1,2]\n0,5;1\n", "q[1,2]"),
+    ] {
+        let table = written(folder.path(), "a.csv", text);
+        assert_eq!(table.columns()[1].name, name);
+        assert_eq!(table.column(1).unwrap(), [1.0]);
+    }
+}
+
 #[test]
 fn a_name_of_two_columns_is_an_error_where_it_is_read() {
     let folder = tempfile::tempdir().unwrap();

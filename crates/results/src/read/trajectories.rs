@@ -257,7 +257,7 @@ pub(super) fn visit(
     let Precision { size, number } = varying.precision;
     let mut bytes = vec![0; varying.rows * size];
     let mut row = vec![0.0; positions.len()];
-    let mut clock = Clock::new(path, &columns[positions[0]].name);
+    let mut clock = Clock::new(path, columns, positions[0]);
     for column in 1..=varying.columns {
         source.read(&mut bytes)?;
         for (value, position) in row.iter_mut().zip(positions) {
