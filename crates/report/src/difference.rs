@@ -7,7 +7,7 @@ use results::{Column, ResultsError, Table};
 
 use crate::plots::Group;
 use crate::samples::{Collector, Samples};
-use crate::statistics::{SCALE, root};
+use crate::statistics::{root, squares};
 use crate::{Error, View};
 
 /// The difference of a variable between two runs.
@@ -291,10 +291,8 @@ struct Sum {
     is_held: bool,
     /// The largest absolute difference and the time of this difference.
     largest: (f64, f64),
-    /// Sum of the squares of the differences.
-    squares: f64,
-    /// Sum of the squares of the differences times [`SCALE`], for differences whose squares overflow.
-    scaled_squares: f64,
+    /// Sums of the [`squares`] of the differences.
+    squares: [f64; 3],
     rows: u64,
     /// The smallest and the largest finite value of both runs.
     range: (f64, f64),
@@ -306,8 +304,7 @@ impl Sum {
             name: column.name.clone(),
             is_held: crate::is_held(column),
             largest: (0.0, f64::NAN),
-            squares: 0.0,
-            scaled_squares: 0.0,
+            squares: [0.0; 3],
             rows: 0,
             range: (f64::INFINITY, f64::NEG_INFINITY),
         }
@@ -323,8 +320,7 @@ impl Sum {
         if size > self.largest.0 {
             self.largest = (size, time);
         }
-        self.squares += size * size;
-        self.scaled_squares += (size * SCALE) * (size * SCALE);
+        self.squares.iter_mut().zip(squares(size)).for_each(|(sum, square)| *sum += square);
         self.rows += 1;
         for finite in [value, other].into_iter().filter(|value| value.is_finite()) {
             self.range = (self.range.0.min(finite), self.range.1.max(finite));
@@ -337,7 +333,7 @@ impl Sum {
         let relative = if largest > 0.0 { largest / range } else { 0.0 };
         #[expect(clippy::cast_precision_loss, reason = "fewer than 2^53 rows")]
         let rows = self.rows.max(1) as f64;
-        let rms = root(self.squares / rows, self.scaled_squares / rows);
+        let rms = root(self.squares.map(|sum| sum / rows));
         Difference { name: self.name, largest, at, rms, rows: self.rows, relative }
     }
 }

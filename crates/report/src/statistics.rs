@@ -35,12 +35,27 @@ pub enum Basis {
     Values(u64),
 }
 
-/// Factor by which values are scaled before they are squared, so that the squares do not overflow.
-pub(crate) const SCALE: f64 = 1e-163;
+/// Factors by which values are scaled: sums and squares of the second do not overflow, and squares of the third do not
+/// underflow.
+const SCALES: [f64; 3] = [1.0, 1e-163, 1e200];
+/// Squares below have lost digits.
+const SMALL: f64 = 1e-280;
 
-/// Returns the root of a mean of squares; if `square` overflowed, computes it from the mean of scaled squares.
-pub(crate) fn root(square: f64, scaled_square: f64) -> f64 {
-    if square.is_infinite() { scaled_square.sqrt() / SCALE } else { square.sqrt() }
+/// Returns the squares of a value, scaled by each of [`SCALES`].
+pub(crate) fn squares(value: f64) -> [f64; 3] {
+    SCALES.map(|scale| (value * scale) * (value * scale))
+}
+
+/// Returns the root of the mean of squares from [`squares`].
+pub(crate) fn root([square, low, high]: [f64; 3]) -> f64 {
+    let [_, down, up] = SCALES;
+    if square.is_infinite() {
+        low.sqrt() / down
+    } else if square < SMALL {
+        high.sqrt() / up
+    } else {
+        square.sqrt()
+    }
 }
 
 /// Collects the statistics of a variable row by row.
@@ -52,12 +67,12 @@ pub(crate) struct Builder {
     before: Option<(f64, f64)>,
     /// Time in s between the first and the last finite row.
     length: f64,
-    /// Integrals of the value, of its square and of its scaled square.
-    integrals: [f64; 3],
+    /// Integrals of the [`powers`].
+    integrals: [f64; 5],
     /// Number of finite values.
     count: u64,
-    /// Sums of the finite values, of their squares and of their scaled squares.
-    sums: [f64; 3],
+    /// Sums of the [`powers`] of the finite values.
+    sums: [f64; 5],
 }
 
 impl Builder {
@@ -74,7 +89,7 @@ impl Builder {
             not_finite: 0,
         };
         let is_held = crate::is_held(column);
-        let (integrals, sums) = ([0.0; 3], [0.0; 3]);
+        let (integrals, sums) = ([0.0; 5], [0.0; 5]);
         Self { statistics, is_held, before: None, length: 0.0, integrals, count: 0, sums }
     }
 
@@ -96,9 +111,9 @@ impl Builder {
             statistics.largest = (value, time);
         }
         self.count += 1;
-        let powers = with_squares(value);
-        if let Some((at, old)) = self.before {
-            let (step, starts) = ((time - at).max(0.0), with_squares(old));
+        let powers = powers(value);
+        if let Some((at, old)) = self.before.filter(|(at, _)| *at < time) {
+            let (step, starts) = (time - at, self::powers(old));
             self.length += step;
             let ends = if self.is_held { starts } else { powers };
             for ((integral, start), end) in self.integrals.iter_mut().zip(starts).zip(ends) {
@@ -111,22 +126,26 @@ impl Builder {
 
     pub(crate) fn finish(self) -> Statistics {
         let Self { mut statistics, length, integrals, count, sums, .. } = self;
-        let (basis, [mean, square, scaled_square]) = if length > 0.0 && statistics.not_finite == 0 {
-            (Basis::Time(length), integrals.map(|integral| integral / length))
-        } else {
-            #[expect(clippy::cast_precision_loss, reason = "fewer than 2^53 values")]
-            let number = count as f64;
-            (Basis::Values(count), sums.map(|sum| sum / number))
-        };
-        statistics.rms = root(square, scaled_square);
-        (statistics.mean, statistics.basis) = (mean, basis);
+        let (basis, [mean, scaled_mean, squares @ ..]) =
+            if length > 0.0 && statistics.not_finite == 0 {
+                (Basis::Time(length), integrals.map(|integral| integral / length))
+            } else {
+                #[expect(clippy::cast_precision_loss, reason = "fewer than 2^53 values")]
+                let number = count as f64;
+                (Basis::Values(count), sums.map(|sum| sum / number))
+            };
+        statistics.rms = root(squares);
+        statistics.mean =
+            if count > 0 && !mean.is_finite() { scaled_mean / SCALES[1] } else { mean };
+        statistics.basis = basis;
         statistics
     }
 }
 
-/// Returns a value, its square, and the square of the value times [`SCALE`].
-fn with_squares(value: f64) -> [f64; 3] {
-    [value, value * value, (value * SCALE) * (value * SCALE)]
+/// Returns a value, the value scaled so that sums do not overflow, and its [`squares`].
+fn powers(value: f64) -> [f64; 5] {
+    let [square, low, high] = squares(value);
+    [value, value * SCALES[1], square, low, high]
 }
 
 #[cfg(test)]
@@ -157,10 +176,17 @@ mod tests {
     }
 
     #[test]
-    fn the_rms_of_values_whose_squares_overflow_is_finite() {
-        for values in [[3e200, 3e200, 3e200], [3e200, f64::NAN, 3e200]] {
-            let rms = statistics(ColumnKind::Real, &values).rms;
-            assert!((rms / 3e200 - 1.0).abs() < 1e-12, "{rms}");
+    fn the_rms_of_values_whose_squares_overflow_or_underflow_and_their_mean_are_finite() {
+        for value in [1.7e308, 3e200, 1.0, 3e-141, 3e-155, 3e-170, 3e-310] {
+            for values in [[value, value, value], [value, f64::NAN, value]] {
+                let Statistics { rms, mean, .. } = statistics(ColumnKind::Real, &values);
+                assert!((rms / value - 1.0).abs() < 1e-12, "{value}: {rms}");
+                assert!((mean / value - 1.0).abs() < 1e-12, "{value}: {mean}");
+            }
+            // A triangle from -v to v has the mean 0 and the mean square v^2 by the trapezoidal rule.
+            let swing = statistics(ColumnKind::Real, &[value, -value, value]);
+            assert_eq!(swing.mean, 0.0);
+            assert!((swing.rms / value - 1.0).abs() < 1e-12, "{value}: {}", swing.rms);
         }
     }
 
