@@ -269,6 +269,7 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
         statistics,
         flat: flat.iter().flat_map(|(group, _)| &group.members).copied().collect(),
         events: &read.events,
+        span: &read.span,
         texts,
         left_out,
         frames: frames.as_deref(),
@@ -325,6 +326,8 @@ struct FirstPass {
     statistics: Vec<Statistics>,
     /// The number of rows.
     rows: usize,
+    /// The first and the last time; empty without rows.
+    span: Vec<f64>,
     events: Events,
     /// Variables that are texts.
     texts: Vec<String>,
@@ -350,9 +353,11 @@ fn read(view: &View<'_>, request: &Request<'_>) -> Result<FirstPass, Error> {
         let columns: Vec<_> =
             positions.iter().map(|at| with_unit(&table.columns()[*at], request)).collect();
         let mut statistics: Vec<_> = columns.iter().map(statistics::Builder::new).collect();
-        let (mut rows, mut events) = (0, Events::default());
+        let (mut rows, mut span, mut events) = (0, Vec::new(), Events::default());
         let visited = view.visit(positions, &mut |time, row| {
             rows += 1;
+            span.truncate(1);
+            span.push(time);
             events.push(time);
             statistics.iter_mut().zip(row).for_each(|(builder, value)| builder.push(time, *value));
         });
@@ -363,6 +368,7 @@ fn read(view: &View<'_>, request: &Request<'_>) -> Result<FirstPass, Error> {
                     statistics: statistics.into_iter().map(statistics::Builder::finish).collect(),
                     columns,
                     rows,
+                    span,
                     events,
                     texts,
                     left_out: rest.len(),

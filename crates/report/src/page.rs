@@ -38,6 +38,8 @@ pub(crate) struct Content<'a> {
     /// The positions of variables that do not change and have no plot.
     pub(crate) flat: Vec<usize>,
     pub(crate) events: &'a Events,
+    /// The first and the last time; empty without rows.
+    pub(crate) span: &'a [f64],
     /// Variables that are texts.
     pub(crate) texts: &'a [String],
     /// Number of variables that are not shown.
@@ -57,6 +59,8 @@ struct Data<'a> {
     marks: &'a [Mark],
     /// The times of events.
     events: &'a [f64],
+    /// The first and the last time.
+    span: &'a [f64],
     /// The command for a page of the same files, from [`command`].
     command: String,
 }
@@ -68,7 +72,8 @@ pub(crate) fn render(content: &Content<'_>, plots: &Plots) -> String {
     let other = request.against.map(|path| path.display().to_string());
     let marks = marks(request.run);
     let events = &content.events.times;
-    let data = Data { plots, marks: &marks, events, command: command(request) };
+    let (span, command) = (content.span, command(request));
+    let data = Data { plots, marks: &marks, events, span, command };
     let data = serde_json::to_string(&data).unwrap_or_default().replace('<', "\\u003c");
     let document = html! {
         (DOCTYPE)

@@ -32,7 +32,7 @@ const ticks = (() => {
 
   /* Texts with the digits that tell each tick from its neighbours. */
   function linearLabels(places) {
-    if (places.length === 1) return [minus(String(Number(places[0].toPrecision(15))))];
+    if (places.length < 3) return places.map((place) => minus(String(Number(place.toPrecision(15)))));
     const step = places[1] - places[0];
     const largest = Math.max(...places.map(Math.abs));
     return places.map((value) => {
@@ -204,7 +204,10 @@ class LinkedAxis {
           if (!isX || isLog) return places;
           const widest = this.breadth(self, ticks.labels(places), index);
           const count = self.bbox.width / devicePixelRatio / Math.max(1, widest);
-          return places.length > count ? ticks.places(low, high, Math.min(most(self), count)) : places;
+          if (count >= places.length) return places;
+          const few = ticks.places(low, high, Math.min(most(self), count));
+          /* A single label shows no scale. */
+          return few.length > 1 || 2 > count ? few : [places[0], places.at(-1)];
         },
         values: (self, places, index) => {
           const texts = ticks.labels(places, ...ends(self), most(self), isLog);

@@ -2,7 +2,7 @@
 /* Draws the plots of #data, first those on the screen: the first ones into #figures, the others into #more, where those of
    each FMU are folded and drawn when they are opened. All plots have the same axis of time. */
 (async () => {
-  const { grids, plots: groups, marks, events, columns, command } = JSON.parse(document.getElementById("data").textContent);
+  const { grids, plots: groups, marks, events, span, columns, command } = JSON.parse(document.getElementById("data").textContent);
   if (!("DecompressionStream" in globalThis)) {
     document.getElementById("figures").textContent = "The plots need a browser of 2023 or later; the tables do not.";
     return;
@@ -62,7 +62,7 @@
   }
 
   function whole(times) {
-    const ends = times.filter((time) => time.length > 0).flatMap((time) => [time[0], time[time.length - 1]]);
+    const ends = [...span, ...times.filter((time) => time.length > 0).flatMap((time) => [time[0], time[time.length - 1]])];
     const [low, high] = ends.length > 0 ? [Math.min(...ends), Math.max(...ends)] : [0, 0];
     return high > low ? [low, high] : [low, low + Math.max(1, 1e-9 * Math.abs(low))];
   }
