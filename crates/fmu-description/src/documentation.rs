@@ -7,11 +7,15 @@ use crate::description::{
     ModelExchange, ScalarVariable, SimpleType, Unknown, Version, attributes, hexadecimal,
 };
 
-const STYLE: &str = "body { font: 16px/1.5 sans-serif; max-width: 72rem; margin: 2rem auto; \
-padding: 0 1rem; color: #222; background: #fff; } h1, h2 { line-height: 1.2; } \
-table { border-collapse: collapse; margin: 1rem 0; } \
-th, td { border: 1px solid #ccc; padding: .2rem .6rem; text-align: left; vertical-align: top; } \
-th { background: #f2f2f2; } code { font-family: monospace; white-space: pre-wrap; }";
+const STYLE: &str = ":root { color-scheme: light dark; --text: #222; --page: #fff; --rule: #ccc; --band: #f2f2f2; } \
+@media (prefers-color-scheme: dark) { :root { --text: #ddd; --page: #16181c; --rule: #555; --band: #26292f; } } \
+body { font: 16px/1.5 sans-serif; max-width: 72rem; margin: 2rem auto; \
+padding: 0 1rem; color: var(--text); background: var(--page); } h1, h2 { line-height: 1.2; } \
+h1, p, li { overflow-wrap: anywhere; } table { border-collapse: collapse; margin: 1rem 0; } \
+table, pre { display: block; overflow-x: auto; } \
+th, td { border: 1px solid var(--rule); padding: .2rem .6rem; text-align: left; vertical-align: top; } \
+th { background: var(--band); } code { font-family: monospace; white-space: pre-wrap; } \
+pre code { white-space: pre; } img, svg { max-width: 100%; } @media print { table, pre { display: revert; } }";
 
 /// Name of the file in `documentation/` with the author's part of the page.
 pub const FRAGMENT: &str = "model.html";
