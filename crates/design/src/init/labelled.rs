@@ -45,7 +45,10 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
     };
     let columns: Vec<Signal> = cells(header).iter().skip(1).map(|cell| named(cell)).collect();
     if columns.is_empty() {
-        return Err(EXPECTED.to_owned());
+        let start: String = header.chars().take(60).collect();
+        return Err(format!(
+            "line 1 is {start:?}, {EXPECTED}; a comment before it is to be removed"
+        ));
     }
     let (mut rows, mut others) = (Vec::new(), Vec::new());
     for (at, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty()) {
@@ -54,15 +57,19 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
             let (expected, count) = (columns.len() + 1, cells.len());
             return Err(format!("line {}: expected {expected} cells, found {count}", at + 1));
         }
-        let number = |(cell, column): (&String, &Signal)| {
+        let number = |(place, (cell, column)): (usize, (&String, &Signal))| {
             // A table with other separators may have decimal commas.
             let digits = if separator == ',' { cell.clone() } else { cell.replace(',', ".") };
             let value = digits.parse::<f64>().ok().filter(|value| value.is_finite());
             value.ok_or_else(|| {
-                format!("line {}, {}: expected a number, found {cell:?}", at + 1, column.name)
+                let (line, name) = (at + 1, &column.name);
+                let name =
+                    if name.is_empty() { format!("column {}", place + 2) } else { name.clone() };
+                format!("line {line}, {name}: expected a number, found {cell:?}")
             })
         };
-        let values = cells[1..].iter().zip(&columns).map(number).collect::<Result<Vec<_>, _>>()?;
+        let values = cells[1..].iter().zip(&columns).enumerate().map(number);
+        let values = values.collect::<Result<Vec<_>, _>>()?;
         let row = named(&cells[0]);
         let name = derivative(&row.name).to_owned();
         // The first row with the name of a state is its derivative: `der(x)`, also behind a measurement x.
@@ -144,6 +151,17 @@ mod tests {
     fn a_log_in_a_file_of_tables_is_told_the_ending_of_logs() {
         let refused = table("time\tu\ty\n0\t1\t2\n", "log.tsv").err().unwrap();
         assert!(refused.ends_with("a .csv file with a column `time`"), "{refused}");
+    }
+
+    #[test]
+    fn errors_of_a_table_say_what_was_found_and_where() {
+        for (text, part) in [
+            ("# logged today\n,x,u\nx,1,1\n", "line 1 is \"# logged today\", expected a table"),
+            (",x,\nx,1,a\n", "line 2, column 3: expected a number, found \"a\""),
+        ] {
+            let refused = table(text, "plant.csv").err().unwrap();
+            assert!(refused.contains(part), "{refused}");
+        }
     }
 
     /// `x_1' = x_2` and `x_2' = -0.5 x_2 + 0.5 u`, the first with the unit of the derivative.
