@@ -75,6 +75,35 @@ impl Balance {
         balance
     }
 
+    /// Balances A, then scales the states that act on no others, or only on such states: a weak effect on one of them
+    /// becomes as strong as A. Their units are free, and balancing leaves them as they are.
+    pub(crate) fn with_ends(a: &DMatrix<f64>) -> Self {
+        let n = a.nrows();
+        let (mut ends, mut is_end) = (Vec::new(), vec![false; n]);
+        let others = |state: usize| (0..n).filter(move |&other| other != state);
+        let acts_on_ends = |state: usize, is_end: &[bool]| {
+            others(state).all(|other| is_end[other] || a[(other, state)] == 0.0)
+        };
+        while let Some(end) = (0..n).find(|&state| !is_end[state] && acts_on_ends(state, &is_end)) {
+            ends.push(end);
+            is_end[end] = true;
+        }
+        let mut balance = Self::new(a);
+        let size = balance.matrix.norm();
+        // A state that acts on others comes before them, as its scale changes its effect.
+        for &state in ends.iter().rev() {
+            let row = others(state).map(|other| balance.matrix[(state, other)].abs());
+            let factor = power_of_two(row.fold(0.0, f64::max) / size);
+            let scale = balance.scale[state] * factor;
+            if factor < 1.0 && factor.is_normal() && scale.is_normal() {
+                balance.matrix.column_mut(state).scale_mut(factor);
+                balance.matrix.row_mut(state).unscale_mut(factor);
+                balance.scale[state] = scale;
+            }
+        }
+        balance
+    }
+
     /// Balances A. `entering`: the 1-norm of each row of B; `leaving`: the 1-norm of each column of C.
     fn with_signals(
         a: &DMatrix<f64>,

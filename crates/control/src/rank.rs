@@ -59,8 +59,8 @@ impl Rank {
 ///
 /// `a`: n x n; `b`: n x m. The powers of A are never formed: the staircase algorithm reduces (A, B)
 /// by orthogonal transformations and adds up the ranks of its steps, after balancing the states and
-/// giving each input unit length. If this rank is not full, it is also computed without balancing, and the larger rank
-/// counts. Each computation has about 20 n^3 multiplications. Tolerance: 100 n eps, relative to the
+/// giving each input unit length. If this rank is not full, it is also computed without balancing, and with a scale of the
+/// states that act on no others, and the largest rank counts. Each computation has about 20 n^3 multiplications. Tolerance: 100 n eps, relative to the
 /// norm of the scaled B in the first step and to the norm of the balanced A in the other steps.
 ///
 /// Source: C. C. Paige, Properties of numerical algorithms related to computing controllability,

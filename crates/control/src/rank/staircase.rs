@@ -28,15 +28,21 @@ pub(crate) struct Staircase {
 }
 
 impl Staircase {
-    /// Computes the form in balanced coordinates, or without balancing if the rank is then larger, because balancing
-    /// scales states that do not act on each other without end.
+    /// Computes the form in balanced coordinates; without balancing, or with the ends of chains scaled as well, if the
+    /// rank is then larger. Balancing scales states that do not act on each other without end, and does not scale
+    /// states that act on no others, whose units would decide.
     pub(crate) fn new(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Self, Error> {
-        let balanced = Self::in_coordinates(Balance::new(a), b)?;
-        if balanced.decision.is_full() {
-            return Ok(balanced);
+        let mut best = Self::in_coordinates(Balance::new(a), b)?;
+        for balance in [Balance::none, Balance::with_ends] {
+            if best.decision.is_full() {
+                break;
+            }
+            let other = Self::in_coordinates(balance(a), b)?;
+            if other.decision.rank > best.decision.rank {
+                best = other;
+            }
         }
-        let unscaled = Self::in_coordinates(Balance::none(a), b)?;
-        Ok(if unscaled.decision.rank > balanced.decision.rank { unscaled } else { balanced })
+        Ok(best)
     }
 
     fn in_coordinates(balance: Balance, b: &DMatrix<f64>) -> Result<Self, Error> {
