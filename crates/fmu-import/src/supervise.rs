@@ -21,8 +21,9 @@ use rustix::process::{
 
 use crate::crash::{self, Call, ENDING_SIGNALS, RECORD, ignores_hangup};
 
-/// Time limit for the child to end after the work of the program.
-const AFTER_WORK: Duration = Duration::from_secs(1);
+/// Time limit for the child to end after the work of the program: on a machine with other work, the exit handlers of a
+/// runtime, such as Python's, take seconds.
+const AFTER_WORK: Duration = Duration::from_secs(5);
 /// Time after an ending signal for which the child may stay in the same calls of FMUs before it is killed.
 const AFTER_SIGNAL: Duration = Duration::from_secs(8);
 /// Interval between two checks of these time limits.
