@@ -10,6 +10,9 @@ const WORTHWHILE: f64 = 0.95;
 /// this multiple of the largest diagonal entry.
 const LARGE: f64 = 1024.0;
 
+/// Part of A below which an effect is a rounding error.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
 /// S^-1 A S, S diagonal and positive such that row i and column i have about the same norm.
 ///
 /// Osborne (1960), Parlett and Reinsch (1969), in the 1-norm without the diagonal. The scale of a
@@ -76,7 +79,8 @@ impl Balance {
     }
 
     /// Balances A, then scales the states that act on no others, or only on such states: a weak effect on one of them
-    /// becomes as strong as A. Their units are free, and balancing leaves them as they are.
+    /// becomes as strong as A, unless it is a rounding error of A. Their units are free, and balancing leaves them as
+    /// they are.
     pub(crate) fn with_ends(a: &DMatrix<f64>) -> Self {
         let n = a.nrows();
         let (mut ends, mut is_end) = (Vec::new(), vec![false; n]);
@@ -95,7 +99,7 @@ impl Balance {
             let row = others(state).map(|other| balance.matrix[(state, other)].abs());
             let factor = power_of_two(row.fold(0.0, f64::max) / size);
             let scale = balance.scale[state] * factor;
-            if factor < 1.0 && factor.is_normal() && scale.is_normal() {
+            if (ROUNDING..1.0).contains(&factor) && scale.is_normal() {
                 balance.matrix.column_mut(state).scale_mut(factor);
                 balance.matrix.row_mut(state).unscale_mut(factor);
                 balance.scale[state] = scale;

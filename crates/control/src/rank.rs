@@ -59,9 +59,10 @@ impl Rank {
 ///
 /// `a`: n x n; `b`: n x m. The powers of A are never formed: the staircase algorithm reduces (A, B)
 /// by orthogonal transformations and adds up the ranks of its steps, after balancing the states and
-/// giving each input unit length. If this rank is not full, it is also computed without balancing, and with a scale of the
-/// states that act on no others, and the largest rank counts. Each computation has about 20 n^3 multiplications. Tolerance: 100 n eps, relative to the
-/// norm of the scaled B in the first step and to the norm of the balanced A in the other steps.
+/// giving each input unit length. If this rank is not full, it is also computed without balancing, and with a scale of
+/// the states that act on no others, and the largest rank counts. Each computation has about 20 n^3 multiplications.
+/// Tolerance: 100 n eps, relative to the norm of the scaled B in the first step and to the norm of the balanced A in the
+/// other steps; 4 eps for the only effects on a state that acts on no others.
 ///
 /// Source: C. C. Paige, Properties of numerical algorithms related to computing controllability,
 /// IEEE Trans. Autom. Control 26 (1981), section IV.
