@@ -185,7 +185,7 @@ mod tests {
             }
             // A triangle from -v to v has the mean 0 and the mean square v^2 by the trapezoidal rule.
             let swing = statistics(ColumnKind::Real, &[value, -value, value]);
-            assert_eq!(swing.mean, 0.0);
+            assert!(swing.mean.abs() <= 0.0, "{}", swing.mean);
             assert!((swing.rms / value - 1.0).abs() < 1e-12, "{value}: {}", swing.rms);
         }
     }
