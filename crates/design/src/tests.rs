@@ -638,6 +638,24 @@ fn a_warning_of_slow_estimates_names_w() {
     assert!((time - 400.0).abs() < 0.1 && warning.contains("or a larger W"), "{warning}");
 }
 
+/// The same loop in seconds and in nanoseconds: the gain of the integral is a rate.
+#[test]
+fn a_bandwidth_gives_fast_samples_the_integral_action_of_slow_ones() {
+    let gain = |speed: f64| {
+        let text = format!(
+            "A = [[-{speed:e}]]\nB = [[{speed:e}]]\nC = [[1]]\nactuator_faults = \"all\"\n\
+             sample_time = {:e}\nfeedback.bandwidth = {speed:e}\nobserver.bandwidth = {:e}\n\
+             reference.track = [\"y1\"]\n",
+            0.1 / speed,
+            4.0 * speed
+        );
+        let gains = read(&text, |file| design(file).unwrap().nominal.gains);
+        gains.unwrap().integral.unwrap().gain[(0, 0)] / speed
+    };
+    let gains = [1.0, 1e9].map(gain);
+    assert!((gains[1] / gains[0] - 1.0).abs() < 1e-4, "{gains:?}");
+}
+
 /// The level and the reasons of a plant file.
 fn judged(text: &str) -> (Level, String) {
     read(text, |file| {

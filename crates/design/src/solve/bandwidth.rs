@@ -24,8 +24,8 @@ impl FeedbackProblem<'_> {
     ) -> Result<GainResult, Refusal> {
         let Self { a, b, c, states, .. } = *self;
         let rate = self::rate(bandwidth)?;
-        // The rows of the integrals are outputs of the plant, too.
-        let integrals = a.view((states, 0), (a.nrows() - states, states)).into_owned();
+        // The rates of the integrals are outputs of the plant, too: a sampled row is that of a step.
+        let integrals = a.view((states, 0), (a.nrows() - states, states)) / domain.step();
         let outputs = stacked(&c.columns(0, states).into_owned(), &integrals);
         let plant = plant(a, &b.rows(0, states).into_owned(), &outputs, domain);
         let units = NaturalUnits::new(&plant, rate)?;
@@ -33,7 +33,7 @@ impl FeedbackProblem<'_> {
         let weighted = DMatrix::from_diagonal(&units.outputs.rows(0, p).into_owned()) * c;
         let mut q = weighted.tr_mul(&weighted);
         for (at, unit) in units.outputs.iter().skip(p).enumerate() {
-            q[(states + at, states + at)] += (rate * domain.step() / SLOWER * unit).powi(2);
+            q[(states + at, states + at)] += (rate / SLOWER * unit).powi(2);
         }
         let ByBandwidth { result, loop_gain, .. } =
             regulator(a, b, &q, &units.inputs, rate, domain)?;
