@@ -303,6 +303,19 @@ fn sizes(gain: &DMatrix<f64>) -> DMatrix<f64> {
     let all = gain.norm().max(f64::MIN_POSITIVE);
     DMatrix::from_fn(gain.nrows(), gain.ncols(), |row, column| {
         let average = gain.row(row).norm() * gain.column(column).norm() / all;
-        gain[(row, column)].abs().max(SMALLEST * average).max(1e-9 * all)
+        let size = gain[(row, column)].abs().max(SMALLEST * average);
+        if size > 0.0 { size } else { 1e-9 * all }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The gains of a PID controller for nanoseconds: K, `K_d` in s and `K_i` in 1/s.
+    #[test]
+    fn the_scale_of_a_gain_does_not_depend_on_the_units_of_the_others() {
+        let scales = sizes(&DMatrix::from_row_slice(1, 3, &[1.0, 2e-10, 3e9]));
+        assert!((scales[(0, 1)] / 2e-10 - 1.0).abs() < 1e-9, "{scales}");
+    }
 }
