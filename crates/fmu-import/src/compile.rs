@@ -26,7 +26,7 @@ const HEADERS: [(&str, &str); 6] = [
 /// The folders that are copied from an FMU to the FMU that is built from it.
 const PARTS: [&str; 4] = ["binaries", "resources", "terminalsAndIcons", "extra"];
 /// Version of the build procedure, a part of the cache key. Change it whenever the procedure changes.
-const RECIPE: u32 = 4;
+const RECIPE: u32 = 5;
 /// Largest number of characters of compiler output that an error quotes.
 const OUTPUT: usize = 4000;
 
@@ -340,7 +340,7 @@ impl<'a> Build<'a> {
         let compiler = self.cpp.as_ref().filter(|_| set.is_cpp(file)).unwrap_or(&self.c);
         let mut command = compiler.command();
         command.current_dir(&self.sources).args(["-c", "-fPIC", "-O2", "-w"]);
-        command.args(set.standard().map(|standard| format!("-std={standard}")));
+        command.args(set.standard(file).map(|standard| format!("-std={standard}")));
         command.arg("-I").arg(&self.sources);
         for folder in &set.include_folders {
             command.arg("-I").arg(self.sources.join(folder));

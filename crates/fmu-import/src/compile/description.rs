@@ -23,20 +23,19 @@ pub(super) struct SourceFileSet {
     language: Option<String>,
     /// Paths of the files to compile, below `sources`.
     pub(super) files: Vec<String>,
-    /// `PreprocessorDefinition`: names and values. Optional definitions are left out.
+    /// `PreprocessorDefinition`: names and values, which may be empty. Optional definitions are left out.
     pub(super) definitions: Vec<(String, Option<String>)>,
     /// Paths of folders of headers, below `sources`.
     pub(super) include_folders: Vec<String>,
 }
 
 impl SourceFileSet {
-    /// Returns whether a file of the set is C++: by the stated language, otherwise by the extension of the file.
+    /// Returns whether a file of the set is C++: by the stated language or by the extension of the file.
     pub(super) fn is_cpp(&self, file: &str) -> bool {
         let extension = Path::new(file).extension().unwrap_or_default();
-        match &self.language {
-            Some(language) => language.to_ascii_uppercase().starts_with("C++"),
-            None => ["cpp", "cc", "cxx"].iter().any(|known| extension.eq_ignore_ascii_case(known)),
-        }
+        let language = self.language.as_deref().unwrap_or_default();
+        language.to_ascii_uppercase().starts_with("C++")
+            || ["cpp", "cc", "cxx"].iter().any(|known| extension.eq_ignore_ascii_case(known))
     }
 
     /// Returns whether any file of the set is C++.
@@ -44,13 +43,16 @@ impl SourceFileSet {
         self.files.iter().any(|file| self.is_cpp(file))
     }
 
-    /// Returns the value of the compiler's option `-std`; `None` if the language states no year. `C99` becomes
-    /// `gnu99`, because sources often use extensions of the compiler.
-    pub(super) fn standard(&self) -> Option<String> {
+    /// Returns the value of the compiler's option `-std`; `None` if the language states no year, or is C and the file
+    /// is C++. `C99` becomes `gnu99`, because sources often use extensions of the compiler, and `C23` becomes `gnu2x`,
+    /// which older compilers know, too.
+    pub(super) fn standard(&self, file: &str) -> Option<String> {
         let language = self.language.as_deref()?.to_ascii_lowercase();
         let year = language.strip_prefix('c')?;
         let is_year = !year.is_empty() && year.trim_start_matches('+').parse::<u32>().is_ok();
-        is_year.then(|| format!("gnu{year}"))
+        let is_of_file = year.starts_with('+') == self.is_cpp(file);
+        let year = if year == "23" { "2x" } else { year };
+        (is_year && is_of_file).then(|| format!("gnu{year}"))
     }
 }
 
@@ -124,10 +126,7 @@ fn sources<'a>(files: impl Iterator<Item = &'a Element>) -> Result<Vec<String>, 
 fn configuration(element: &Element) -> Result<BuildConfiguration, String> {
     let set = |set: &Element| -> Result<SourceFileSet, String> {
         let definition = |definition: &Element| {
-            Some((
-                attribute(definition, "name")?,
-                attribute(definition, "value").filter(|value| !value.is_empty()),
-            ))
+            Some((attribute(definition, "name")?, attribute(definition, "value")))
         };
         let is_used = |child: &&Element| {
             !matches!(attribute(child, "optional").as_deref(), Some("true" | "1"))
@@ -192,13 +191,13 @@ mod tests {
             <PreprocessorDefinition name="A" value="2"/><PreprocessorDefinition name="B"/>
             <PreprocessorDefinition name="C" optional="true"/>
             <PreprocessorDefinition name="D" optional="1"/>
-            <PreprocessorDefinition name="E" optional="0"/>
+            <PreprocessorDefinition name="E" value="" optional="0"/>
             </SourceFileSet></BuildConfiguration>"#,
         );
         let configuration = configuration(&element.unwrap()).unwrap();
         let definitions = configuration.sets[0].definitions.iter();
         let definitions = definitions.map(|(name, value)| (name.as_str(), value.as_deref()));
-        let expected = [("A", Some("2")), ("B", None), ("E", None)];
+        let expected = [("A", Some("2")), ("B", None), ("E", Some(""))];
         assert_eq!(definitions.collect::<Vec<_>>(), expected);
     }
 
@@ -229,12 +228,21 @@ mod tests {
         }
     }
 
+    /// A compiler for C compiles `model.cpp` as C++, but does not link the library of C++.
     #[test]
-    fn a_stated_language_is_that_of_every_file() {
-        for (language, is_cpp) in [("C99", false), ("C++11", true), ("c++11", true)] {
+    fn a_file_is_cpp_by_the_stated_language_or_by_its_extension() {
+        for (language, is_cpp, standards) in [
+            ("C99", [false, true], [Some("gnu99"), None]),
+            ("C23", [false, true], [Some("gnu2x"), None]),
+            ("C++11", [true, true], [Some("gnu++11"); 2]),
+            ("c++11", [true, true], [Some("gnu++11"); 2]),
+        ] {
             let language = Some(language.to_owned());
             let set = SourceFileSet { language, ..SourceFileSet::default() };
-            assert_eq!(["solver.c", "model.cpp"].map(|file| set.is_cpp(file)), [is_cpp; 2]);
+            let files = ["solver.c", "model.cpp"];
+            assert_eq!(files.map(|file| set.is_cpp(file)), is_cpp);
+            let expected = standards.map(|standard| standard.map(str::to_owned));
+            assert_eq!(files.map(|file| set.standard(file)), expected);
         }
     }
 }
