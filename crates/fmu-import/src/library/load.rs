@@ -72,6 +72,15 @@ impl Loading<'_> {
                 place.leave();
                 opened = lenient.map_or(opened, Ok);
             }
+        } else if let Err(message) = &opened
+            && message == "cannot open shared object file: No such file or directory"
+            && self.path.is_file()
+        {
+            // The linker of glibc reports a library for another processor as missing.
+            hint = format!(
+                ": the file is there, for another processor than {}",
+                std::env::consts::ARCH
+            );
         }
         match opened {
             Ok(library) => Ok(Handle { library: ManuallyDrop::new(library), fmu: self.fmu.into() }),
@@ -192,4 +201,29 @@ pub fn preload(library: &OsStr) -> Result<(), LoadError> {
         message: reason(&error),
         hint: String::new(),
     })
+}
+
+#[cfg(all(test, target_os = "linux", target_env = "gnu"))]
+mod tests {
+    use std::fs;
+    use std::io::Read as _;
+
+    use fmu_description::package::TemporaryFolder;
+
+    use super::*;
+
+    #[test]
+    fn a_library_for_another_processor_is_refused_for_that_reason() {
+        let mut header = [0; 4096];
+        let program = std::env::current_exe().unwrap();
+        fs::File::open(program).unwrap().read_exact(&mut header).unwrap();
+        // The field `e_machine` of the ELF header; 8 is MIPS.
+        header[18..20].copy_from_slice(&8_u16.to_ne_bytes());
+        let folder = TemporaryFolder::new().unwrap();
+        let path = folder.path().join("model.so");
+        fs::write(&path, header).unwrap();
+        let loading = Loading { path: &path, fmu: "model", binding: Binding::Lenient };
+        let error = loading.load().err().unwrap();
+        assert!(error.to_string().contains("for another processor than"), "{error}");
+    }
 }
