@@ -337,11 +337,17 @@ impl<S: Slave> Trial<'_, S> {
 
     /// Reads the outputs; adds a finding if that fails.
     fn read_outputs(&mut self, slave: &mut S) -> Option<Vec<Value>> {
-        let values = outputs(self.description).take(VARIABLES).map(|variable| get(slave, variable));
-        values
-            .collect::<Result<_, _>>()
-            .map_err(|error| self.report(&error, "for an output", "2.1.7"))
-            .ok()
+        let mut values = Vec::new();
+        for variable in outputs(self.description).take(VARIABLES) {
+            match get(slave, variable) {
+                Ok(value) => values.push(value),
+                Err(error) => {
+                    self.report(&error, &format!("for the output {}", variable.name), "2.1.7");
+                    return None;
+                }
+            }
+        }
+        Some(values)
     }
 
     /// Compares the start values with the description; `None` if the process of the FMU ended.
