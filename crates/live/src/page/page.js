@@ -350,7 +350,10 @@
   }
   field("set").addEventListener("submit", (event) => {
     event.preventDefault();
-    const value = literal(field("set-value").value, setting()?.kind);
+    const text = field("set-value").value.trim();
+    const kind = setting()?.kind;
+    // The page shows Booleans as 0 and 1.
+    const value = (kind === "Boolean" && { 0: "false", 1: "true" }[text]) || literal(text, kind);
     send("scenario", `[[set]]\nvariable = ${quoted(field("set-variable").value)}\nvalue = ${value}\n`);
   });
 
