@@ -101,7 +101,8 @@ fn is_macro(field: &str, prefix: &str) -> bool {
     let capital = format!("{}_", prefix.to_ascii_uppercase());
     let [mut starts, mut ends] = NUMBERS.map(str::split_ascii_whitespace);
     let signed = field.strip_prefix('U').unwrap_or(field);
-    field.starts_with("ASO_")
+    // No macro ends in a digit, so that a number makes a field of every name.
+    field.starts_with("ASO_") && !field.ends_with(|sign: char| sign.is_ascii_digit())
         || field.strip_prefix(&capital).is_some_and(|rest| is_in(MACROS, rest))
         || starts.any(|start| signed.starts_with(start)) && ends.any(|end| signed.ends_with(end))
 }
