@@ -317,6 +317,7 @@ def test_a_signal_of_numpy_is_that_of_the_same_lists_in_every_run():
 def test_an_object_that_knows_its_system_is_collected_with_it():
     class Source:
         outputs = ["y"]
+        system: af.System
 
         def step(self, t, dt, inputs):
             return {"y": t}
