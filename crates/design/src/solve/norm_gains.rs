@@ -158,12 +158,15 @@ impl ObserverProblem<'_> {
         Ok((norm(&gain)? <= ROUNDED * RELAXED * high).then_some(gain))
     }
 
-    /// Computes a lower bound of the norm for all gains: with noise the bound for filters of any order; without noise
-    /// the larger one of this bound and the bound for gains with all eigenvalues in the disc of the region. None if no
-    /// bound is known.
+    /// Computes a lower bound of the norm for all gains, the largest one that is known: for filters of any order, and
+    /// without noise for gains with all eigenvalues in the disc of the region. With noise the bounds without noise hold,
+    /// too, as each input can only raise the norm. None if no bound is known.
     fn lower_bound(&self, required: NormRequirement<'_>) -> Result<Option<LowerBound>, Error> {
         if !required.channel.noise.is_empty() {
-            return Ok(self.noisy_lower_bound(required)?.map(LowerBound::for_filters));
+            let noisy = self.noisy_lower_bound(required)?.map(LowerBound::for_filters);
+            let channel = &Channel { noise: Vec::new(), ..required.channel.clone() };
+            let quiet = self.lower_bound(NormRequirement { channel, ..required })?;
+            return Ok(noisy.into_iter().chain(quiet).max_by(|x, y| x.norm.total_cmp(&y.norm)));
         }
         let (a, c, performance) = self.extended(required)?;
         // If this computation fails, there is no bound; the gain does not depend on it.
