@@ -67,6 +67,9 @@ struct Renamed {
     read: String,
 }
 
+/// The start of a pointer of Git LFS.
+const POINTER: &[u8; 23] = b"version https://git-lfs";
+
 /// An archive that is safe to unpack.
 pub(super) struct Archive {
     zip: ZipArchive<Metered<BufReader<File>>>,
@@ -79,6 +82,17 @@ pub(super) struct Archive {
     capacity: u64,
 }
 
+/// Returns the error of a file that is no archive. A clone without Git LFS has small text files in place of FMUs.
+fn unreadable(path: &Path, error: ZipError) -> PackageError {
+    let mut start = [0; POINTER.len()];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));
+    if read.is_err() || start != *POINTER {
+        return archive_error(path)(error);
+    }
+    let help = "it is a pointer of Git LFS; `git lfs pull` fetches the file itself";
+    PackageError::Archive { path: path.to_owned(), source: io::Error::other(help) }
+}
+
 impl Archive {
     /// Opens the archive at `path` and checks its list of entries; writes nothing.
     pub(super) fn open(path: &Path) -> Result<Self, PackageError> {
@@ -86,7 +100,7 @@ impl Archive {
         let length = file.metadata().map_err(file_error("read", path))?.len();
         let left = Rc::new(Cell::new(in_force(DIRECTORY)));
         let reader = Metered { inner: BufReader::new(file), left: left.clone() };
-        let zip = ZipArchive::new(reader).map_err(archive_error(path))?;
+        let zip = ZipArchive::new(reader).map_err(|error| unreadable(path, error))?;
         left.set(u64::MAX);
         let capacity = BASE.saturating_add(RATIO.saturating_mul(length)).min(CAPACITY);
         let capacity = in_force(capacity);
