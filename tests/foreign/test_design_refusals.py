@@ -137,7 +137,7 @@ def test_a_controller_can_be_made_from_a_packed_controller_only(aso_ftc, refusal
 
 POORER = [
     ((), "1:9: cannot open Servo.fmu"),
-    ((NO_EXCHANGE, NO_DERIVATIVES), "that are its states among theta, omega (`states` names them)"),
+    ((NO_EXCHANGE, NO_DERIVATIVES), "theta_m, T_f, i (`states` names them)"),
     ((NO_EXCHANGE, NO_DERIVATIVES, NO_FMU_STATE), "providesDirectionalDerivative"),
 ]
 
