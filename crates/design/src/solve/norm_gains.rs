@@ -160,13 +160,14 @@ impl ObserverProblem<'_> {
 
     /// Computes a lower bound of the norm for all gains, the largest one that is known: for filters of any order, and
     /// without noise for gains with all eigenvalues in the disc of the region. With noise the bounds without noise hold,
-    /// too, as each input can only raise the norm. None if no bound is known.
+    /// too, as each input can only raise the norm; alone they would say little. None if no bound is known.
     fn lower_bound(&self, required: NormRequirement<'_>) -> Result<Option<LowerBound>, Error> {
         if !required.channel.noise.is_empty() {
-            let noisy = self.noisy_lower_bound(required)?.map(LowerBound::for_filters);
+            let Some(noisy) = self.noisy_lower_bound(required)? else { return Ok(None) };
             let channel = &Channel { noise: Vec::new(), ..required.channel.clone() };
             let quiet = self.lower_bound(NormRequirement { channel, ..required })?;
-            return Ok(noisy.into_iter().chain(quiet).max_by(|x, y| x.norm.total_cmp(&y.norm)));
+            let quiet = quiet.filter(|quiet| quiet.norm > noisy);
+            return Ok(Some(quiet.unwrap_or(LowerBound::for_filters(noisy))));
         }
         let (a, c, performance) = self.extended(required)?;
         // If this computation fails, there is no bound; the gain does not depend on it.

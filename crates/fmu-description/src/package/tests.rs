@@ -339,8 +339,7 @@ fn files_that_are_no_fmus_are_refused_with_the_reason() {
     assert!(matches!(absent, PackageError::File { action: "open", .. }), "{absent}");
     let text = opened(b"just text").unwrap_err();
     assert!(matches!(text, PackageError::Archive { .. }), "{text}");
-    let pointer =
-        opened(b"version https://git-lfs/spec/v1\noid sha256:0\nsize 1\n").unwrap_err();
+    let pointer = opened(b"version https://git-lfs/spec/v1\noid sha256:0\nsize 1\n").unwrap_err();
     assert!(
         std::error::Error::source(&pointer).unwrap().to_string().contains("`git lfs pull`"),
         "{pointer}"
