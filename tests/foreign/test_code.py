@@ -513,9 +513,8 @@ def test_names_become_different_identifiers_and_the_header_lists_them(aso_ftc, t
     code.compiled("-O2"), code.crate()
 
 
-@pytest.mark.parametrize("name", ["Q_H", "Q_STATES", "INT8_MAX", "ASO_HELD"])
-def test_a_signal_may_have_the_name_of_a_macro(aso_ftc, tmp_path, name):
-    Built(aso_ftc, masses("current", "true").replace('"Q_1"', f'"{name}"'), tmp_path, name="q").compiled("-O2")
+def test_a_signal_may_have_the_name_of_the_header(aso_ftc, tmp_path):
+    Built(aso_ftc, masses("current", "true").replace('"Q_1"', '"Q_H"'), tmp_path, name="q").compiled("-O2")
 
 
 def test_a_continuous_design_has_no_code_and_float_needs_code(aso_ftc, tmp_path):

@@ -18,10 +18,8 @@ pub(super) struct Fields {
 }
 
 impl Fields {
-    /// The identifiers in the files for the plant `prefix`.
-    pub(super) fn of(controller: &Controller, prefix: &str) -> Self {
-        let names =
-            |signals: &[Signal]| fields(signals.iter().map(|signal| signal.name.as_str()), prefix);
+    pub(super) fn of(controller: &Controller) -> Self {
+        let names = |signals: &[Signal]| fields(signals.iter().map(|signal| signal.name.as_str()));
         Self {
             states: names(&controller.states),
             faults: names(&controller.faults),

@@ -122,7 +122,7 @@ pub fn write(design: aso_controller::Design, request: &Request<'_>) -> Result<Co
         Precision::Double => None,
         Precision::Single => Some(RoundingBound::of(&controller)),
     };
-    let fields = Fields::of(&controller, &request.prefix);
+    let fields = Fields::of(&controller);
     let files = match request.language {
         Language::C => c::files(request, &controller, &fields, bound.as_ref()),
         Language::Rust => rust::files(request, &controller, &fields, bound.as_ref()),

@@ -21,17 +21,6 @@ deps examples fenv incremental inttypes iso646 limits locale lpt1 lpt2 lpt3 lpt4
 lpt8 lpt9 math nul prn proc_macro setjmp signal stdalign stdarg stdatomic stdbool stddef stdint \
 stdio stdlib stdnoreturn std string test tgmath threads time uchar wchar wctype";
 
-/// The macros of the header of a controller, without the name of the header.
-const MACROS: &str = "\
-actuators at_limit cases faults first_compensated first_tested gain_sets held lost measurements outside \
-overflow points references residual_states residuals sample_time states suspects tests";
-
-/// The starts and the ends of the macros of `stdint.h` and `float.h`; a `U` may precede the start.
-const NUMBERS: [&str; 2] = [
-    "DBL_ DECIMAL_ FLT_ INT_ INT8_ INT16_ INT32_ INT64_ INTMAX_ INTPTR_ LDBL_ PTRDIFF_ SIG_ATOMIC_ SIZE_ WCHAR_ WINT_",
-    "_DIG _EPSILON _EXP _MAX _METHOD _MIN _RADIX _ROUNDS _SUBNORM _WIDTH",
-];
-
 /// The most characters of the name of a controller: with `_init_at` it has the 31 characters that C99 guarantees for an
 /// external name.
 const LONGEST_PREFIX: usize = 23;
@@ -54,8 +43,8 @@ pub fn prefix(name: &str) -> String {
 }
 
 /// Returns a field for each name: letters, digits and `_`. Ignoring case, the fields differ from each other and from
-/// reserved words. None is a macro of the files for the plant `prefix`.
-pub(super) fn fields<'a>(names: impl Iterator<Item = &'a str>, prefix: &str) -> Vec<String> {
+/// reserved words.
+pub(super) fn fields<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut all: Vec<String> = Vec::new();
     for (position, name) in names.enumerate() {
         let mut plain = plain(name, LONGEST_FIELD);
@@ -63,9 +52,7 @@ pub(super) fn fields<'a>(names: impl Iterator<Item = &'a str>, prefix: &str) -> 
             plain = format!("signal_{}", position + 1);
         }
         let is_free = |field: &str| {
-            !is_in(RESERVED, field)
-                && !is_macro(field, prefix)
-                && !all.iter().any(|other| other.eq_ignore_ascii_case(field))
+            !is_in(RESERVED, field) && !all.iter().any(|other| other.eq_ignore_ascii_case(field))
         };
         let numbered = (2..).map(|number: u32| format!("{plain}_{number}"));
         let field = std::iter::once(plain.clone()).chain(numbered).find(|field| is_free(field));
@@ -96,17 +83,6 @@ fn is_in(list: &str, name: &str) -> bool {
     list.split_ascii_whitespace().any(|word| word.eq_ignore_ascii_case(name))
 }
 
-/// Whether `field` is a macro of the header for `prefix`, of `aso_controller.h`, or of a header of C that they include.
-fn is_macro(field: &str, prefix: &str) -> bool {
-    let capital = format!("{}_", prefix.to_ascii_uppercase());
-    let [mut starts, mut ends] = NUMBERS.map(str::split_ascii_whitespace);
-    let signed = field.strip_prefix('U').unwrap_or(field);
-    // No macro ends in a digit, so that a number makes a field of every name.
-    field.starts_with("ASO_") && !field.ends_with(|sign: char| sign.is_ascii_digit())
-        || field.strip_prefix(&capital).is_some_and(|rest| is_in(MACROS, rest))
-        || starts.any(|start| signed.starts_with(start)) && ends.any(|end| signed.ends_with(end))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,28 +93,12 @@ mod tests {
             ["motor.u", "q[2]", "'motor 2'", "q_2", "Q_2", "int", "3d", "Druck \u{3b8}", "\u{3b8}"];
         let expected =
             ["motor_u", "q_2", "motor_2", "q_2_2", "Q_2_3", "int_2", "n3d", "Druck", "signal_9"];
-        assert_eq!(fields(names.into_iter(), "p"), expected);
+        assert_eq!(fields(names.into_iter()), expected);
     }
 
     #[test]
     fn a_repeated_name_gets_a_number_that_is_free() {
-        assert_eq!(fields(["a", "a_2", "A"].into_iter(), "p"), ["a", "a_2", "A_3"]);
-    }
-
-    #[test]
-    fn a_field_is_no_macro_of_its_file() {
-        let macros = [
-            "KEYS_STATES",
-            "KEYS_AT_LIMIT",
-            "INT8_MAX",
-            "UINT_FAST8_MAX",
-            "FLT_MIN_10_EXP",
-            "ASO_HELD",
-        ];
-        let numbered = macros.map(|name| format!("{name}_2"));
-        assert_eq!(fields(macros.into_iter(), "keys"), numbered);
-        let others = ["KEYS_H", "STATES", "INTAKE_MAX", "FLT_1", "T_MAX"];
-        assert_eq!(fields(others.into_iter(), "keys"), others);
+        assert_eq!(fields(["a", "a_2", "A"].into_iter()), ["a", "a_2", "A_3"]);
     }
 
     #[test]
