@@ -9,7 +9,7 @@ use super::parts::Signal;
 use super::rounding::RoundingBound;
 use super::text::{aligned, ascii, filled, one_line};
 use super::{Precision, Request};
-use aso_controller::design::{Estimator, Loss, SlidingMode};
+use aso_controller::design::{Estimator, Loss, SlidingMode, integral_unit};
 
 /// The functions and flags of a language, in the notation of the language.
 pub(super) struct Vocabulary {
@@ -49,20 +49,11 @@ pub(super) fn descriptions_of_estimates(controller: &Controller) -> Vec<String> 
         losses.map(|loss| format!("Estimate of the lost part of the effect of `{}`", name(loss)));
     let integrals = controller.references.iter().filter(|_| controller.h.is_some());
     let integrals = integrals.map(|signal| {
-        let unit = signal.unit.as_deref().map(times_second);
+        let unit = signal.unit.as_deref().map(integral_unit);
         let unit = unit.map_or_else(String::new, |unit| format!(" in {unit}"));
         ascii(&format!("Integral for the reference `{}`{unit}", one_line(&signal.name)))
     });
     states.chain(faults).chain(losses).chain(integrals).collect()
-}
-
-/// The unit times a second, written as in the controller FMU: `m` gives `m.s`, `m/s` gives `m`, `km/h` gives `s.km/h`.
-fn times_second(unit: &str) -> String {
-    match unit.strip_suffix("/s") {
-        Some(unit) => unit.to_owned(),
-        None if unit.contains('/') => format!("s.{unit}"),
-        None => format!("{unit}.s"),
-    }
 }
 
 /// Returns the lines that describe a controller, in ASCII.
@@ -266,7 +257,7 @@ fn signals(controller: &Controller, fields: &Fields) -> Vec<String> {
         rows.push([
             format!("Estimates.x_i_{field}"),
             format!("integral for {}", one_line(&reference.name)),
-            reference.unit.as_deref().map(times_second).unwrap_or_default(),
+            reference.unit.as_deref().map(integral_unit).unwrap_or_default(),
             "0.0".to_owned(),
             String::new(),
         ]);
@@ -385,14 +376,6 @@ fn precision(request: &Request<'_>, vocabulary: &Vocabulary) -> [String; 1] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The units of the controller FMU, whose tests compare their dimensions.
-    #[test]
-    fn an_integral_has_the_unit_of_its_reference_times_a_second() {
-        for (unit, integral) in [("m", "m.s"), ("rad/s", "rad"), ("1/s", "1"), ("km/h", "s.km/h")] {
-            assert_eq!(times_second(unit), integral);
-        }
-    }
 
     #[test]
     fn a_loop_that_bears_every_delay_has_no_number() {

@@ -17,7 +17,9 @@ use detection::DetectionDesign;
 pub use error::{DesignError, Reason};
 pub use reconfiguration::{Combination, Fallback, GainSet, Reconfiguration};
 use schedule::Schedule;
-pub use signals::{Actuator, Fault, HOLD_ROUNDING, Label, Loss, Measurement, Signal};
+pub use signals::{
+    Actuator, Fault, HOLD_ROUNDING, Label, Loss, Measurement, Signal, integral_unit,
+};
 
 /// The matrices of a design or of a point of its schedule with their names: the eight required ones, then the optional
 /// ones of the listed fields that are stated.

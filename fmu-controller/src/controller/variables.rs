@@ -9,7 +9,7 @@ use crate::controller::AsoController;
 use crate::dependencies::Group;
 use crate::{dependencies, names};
 use aso_controller::channel;
-use aso_controller::design::{Design, Label, Measurement};
+use aso_controller::design::{Design, Label, Measurement, integral_unit};
 
 type Variable = fmu::Variable<AsoController>;
 
@@ -56,16 +56,9 @@ fn per_second(unit: Option<&String>) -> Option<String> {
     Unit::parse(&slope).is_ok().then_some(slope)
 }
 
-/// The unit times a second: `m` gives `m.s`, `m/s` gives `m`, `km/h` gives `s.km/h`. `None` without a unit, or if FMI
-/// cannot write it.
+/// The unit times a second, see [`integral_unit`]. `None` without a unit, or if FMI cannot write it.
 fn times_second(unit: Option<&String>) -> Option<String> {
-    let unit = unit?;
-    let integral = match unit.strip_suffix("/s") {
-        Some(unit) => unit.to_owned(),
-        // `km/h.s` is no unit of FMI: after `/`, only a single unit or parentheses may follow.
-        None if unit.contains('/') => format!("s.{unit}"),
-        None => format!("{unit}.s"),
-    };
+    let integral = integral_unit(unit?);
     Unit::parse(&integral).is_ok().then_some(integral)
 }
 

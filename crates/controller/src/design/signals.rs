@@ -50,6 +50,19 @@ macro_rules! signals {
     )*};
 }
 
+/// Returns the unit of an integral over time: `m` gives `m.s`, `m/s` gives `m`, `km/h` gives `s.km/h`.
+///
+/// `km/h.s` is no unit of FMI: after `/`, only a single unit or parentheses may follow. A unit with an offset, such as
+/// degC, has no integral that FMI can write; the result is then no unit of FMI.
+#[must_use]
+pub fn integral_unit(unit: &str) -> String {
+    match unit.strip_suffix("/s") {
+        Some(unit) => unit.to_owned(),
+        None if unit.contains('/') => format!("s.{unit}"),
+        None => format!("{unit}.s"),
+    }
+}
+
 signals! {
     /// A state or a reference.
     Signal {
