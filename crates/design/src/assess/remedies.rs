@@ -31,17 +31,20 @@ const LARGEST_SHAPED: usize = 8;
 /// Part of the present peak of S below which a change must bring this peak to be proposed.
 const LOWER: f64 = 0.95;
 
-/// Returns a remedy for each peak of S above its limit, and for instability within the tolerances: slower or faster loops,
-/// and the shape of the loop where none of them makes the verdict green. There is none for
-/// gains by linear matrix inequalities or by the shape of the loop, for requirements that are not scaled, for several
-/// plants or a large one, and without time.
+/// Returns a remedy for each peak of S above its limit, and for instability within the tolerances.
+///
+/// These are the units of signals that have none; slower or faster loops; and the shape of the loop, where no speed makes
+/// the verdict green. Other loops are not tried for gains by linear matrix inequalities or by the shape of the loop, for
+/// requirements that are not scaled, for several plants or a large one, and without time.
 pub(crate) fn remedies(
     file: &PlantFile<'_>,
+    nominal: &Solution,
     robustness: Option<&Robustness>,
     budget: &Budget,
 ) -> Vec<Remedy> {
     let limits = &file.robustness;
     let Some(robustness) = robustness else { return Vec::new() };
+    let mut remedies = of_units(nominal, robustness, limits);
     let of_peaks = robustness.points.iter().enumerate();
     let mut reasons: Vec<_> = of_peaks
         .filter_map(|(at, point)| {
@@ -53,6 +56,7 @@ pub(crate) fn remedies(
     if robustness.tolerance.is_unstable() && limits.parameters.is_empty() {
         reasons.push(Reason { text: instability(&robustness.tolerance), aim: Aim::Stable });
     }
+    reasons.retain(|reason| remedies.iter().all(|remedy| remedy.reason != reason.text));
     // Such gains take long to compute.
     let searched = [&file.feedback, &file.observer].iter().any(|request| {
         matches!(request.requirement, Requirement::Region(_) | Requirement::HInfinity { .. })
@@ -63,7 +67,7 @@ pub(crate) fn remedies(
     let order = robustness.tolerance.worst.first().map_or(0, |a| a.values.len());
     let variants = if single { variants(file) } else { Vec::new() };
     if reasons.is_empty() || variants.is_empty() || order > LARGEST_ORDER || budget.is_over() {
-        return Vec::new();
+        return remedies;
     }
     let present = Present {
         peaks: robustness.points.iter().map(|point| point.judged).collect(),
@@ -83,17 +87,13 @@ pub(crate) fn remedies(
         trials.extend(shaped.filter(|_| !budget.is_over()));
     }
     let remedy = |reason: Reason| reason.remedy(&trials, is_complete, &present, limits);
-    reasons.into_iter().filter_map(remedy).collect()
+    remedies.extend(reasons.into_iter().filter_map(remedy));
+    remedies
 }
 
 /// Returns a remedy for each peak of S that is above its limit only because signals without units count as equal: to
 /// state the units.
-pub(crate) fn of_units(
-    nominal: &Solution,
-    robustness: Option<&Robustness>,
-    limits: &RobustnessLimits,
-) -> Vec<Remedy> {
-    let Some(robustness) = robustness else { return Vec::new() };
+fn of_units(nominal: &Solution, robustness: &Robustness, limits: &RobustnessLimits) -> Vec<Remedy> {
     let linear = &nominal.linear;
     let signals = [
         (linear.actuators.as_slice(), "actuator"),

@@ -23,7 +23,7 @@ use crate::assess::matrices::Names;
 use crate::assess::pid;
 use crate::assess::reconfiguration::reasons as reconfiguration_reasons;
 use crate::assess::references::{beyond_limits, reached, reference_steps};
-use crate::assess::remedies::{of_units, remedies};
+use crate::assess::remedies::remedies;
 use crate::assess::responses::responses;
 use crate::assess::robustness::{delay_reasons, robustness};
 use crate::assess::schedule::{self as schedule_report, judge_schedule};
@@ -125,10 +125,8 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
         .extend(fallback.iter().flat_map(|report| fallback::reasons(report, file.robustness.red)));
     let family_report = family_report::family(designed, &file.robustness, &budget)?;
     let schedule = schedule_report::schedule(designed, &file.robustness, &budget)?;
-    let of_units = of_units(nominal, robustness.as_ref(), &file.robustness);
-    let mut remedies = steps.run(Step::Remedies, || remedies(file, robustness.as_ref(), &budget));
-    remedies.retain(|remedy| of_units.iter().all(|other| other.reason != remedy.reason));
-    remedies.extend(of_units);
+    let remedies =
+        steps.run(Step::Remedies, || remedies(file, nominal, robustness.as_ref(), &budget));
     let mut verdict = verdict(&checks, robustness.as_ref(), &file.robustness, further, remedies);
     if let Some(family) = &family_report {
         judge_family(&mut verdict, family, &file.robustness);
