@@ -64,8 +64,8 @@ fn judge_end(ended: &Ended) -> u8 {
         (Some(status), _) if has_chosen_end(ended) => status,
         (Some(status), _) => {
             tracing::error!(
-                "after the end of the run, something that an FMU or a library of --preload has left in the process (an exit handler, a \
-                 destructor or a thread) {end}; nothing of the run is lost; {ADVICE}"
+                "after the end of the run, something that an FMU or a library of --preload has left in the process \
+                 (an exit handler, a destructor or a thread) {end}; nothing of the run is lost; {ADVICE}"
             );
             status.max(LOST)
         }

@@ -300,14 +300,6 @@ def test_the_worst_case_is_a_plant_file(aso_ftc, tmp_path):
     assert aso_ftc("design", tmp_path / "w.toml", "--out", tmp_path / "again.toml").returncode == 0
 
 
-@pytest.mark.parametrize("name", ["Servo.fmu", "trolley.csv"])
-def test_an_fmu_or_a_table_in_place_of_a_plant_file_is_refused_with_the_option_that_takes_it(aso_ftc, tmp_path, name):
-    (tmp_path / name).write_bytes(b"PK\xff")
-    done = aso_ftc("design", tmp_path / name)
-    assert done.returncode == 2
-    assert f"no plant file; `aso-ftc design --init {tmp_path / name}` writes one for it" in done.stderr
-
-
 @pytest.mark.parametrize("option", ["--certificate-time", "--gain-time"])
 def test_a_negative_time_is_refused_with_what_is_expected(aso_ftc, option):
     done = aso_ftc("design", "plant.toml", option, "-1")

@@ -29,10 +29,10 @@ const LARGE: usize = 48;
 /// The eigenvalues of A, ordered by real part, then by imaginary part.
 ///
 /// `a`: n x n, finite. Method: eigenvalues that a permutation of the states isolates on the diagonal, then diagonal
-/// balancing (both Parlett and Reinsch 1969) and the QR algorithm with a bounded number of iterations: with the Schur form, about 25 n^3 operations, or without it, 10 n^3, from order 48 on. If one
-/// form of the algorithm fails, the other is tried, then the Schur form of a reflected A. The result is exact for a
-/// matrix that differs from the balanced A by a few units of rounding of its norm. Complex eigenvalues are exact
-/// conjugates.
+/// balancing (both Parlett and Reinsch 1969) and the QR algorithm with a bounded number of iterations: with the Schur
+/// form, about 25 n^3 operations, or without it, 10 n^3, from order 48 on. If one form of the algorithm fails, the other
+/// is tried, then the Schur form of a reflected A. The result is exact for a matrix that differs from the balanced A by a
+/// few units of rounding of its norm. Complex eigenvalues are exact conjugates.
 ///
 /// # Example
 ///

@@ -103,9 +103,9 @@ fn dependency_row(
         row.push((known(variables, variable, name)?, *kind));
     }
     for name in &variable.clocks {
-        let is_known =
-            |clock: &Declaration| clock.name == *name && clock.causality == Causality::Input;
-        if let Some(clock) = variables.declarations.iter().position(is_known) {
+        if let Some(&clock) = variables.positions.get(name.as_str())
+            && variables.declarations[clock].causality == Causality::Input
+        {
             row.push((index(clock), DependencyKind::Dependent));
         }
     }
