@@ -69,60 +69,25 @@ impl BaseUnit {
 
     /// Returns factor and offset of the conversion from this unit to `other`, `value_in_other = factor * value +
     /// offset`; `None` if the exponents differ. A [difference](crate::RealType::is_relative) is
-    /// converted by the factor alone. Factors and offsets that are the nearest numbers to simple fractions count as
-    /// these fractions, so that 1 m/s is 3.6 km/h, not 3.5999999999999996 km/h.
+    /// converted by the factor alone. Both are the shortest decimals within their rounding errors, so that 1 m/s is
+    /// 3.6 km/h, not 3.5999999999999996 km/h.
     #[must_use]
     pub fn conversion(&self, other: &BaseUnit) -> Option<(f64, f64)> {
-        let factor = quotient(self.factor, other.factor);
-        let offset = quotient(difference(self.offset, other.offset), other.factor);
-        (self.exponents() == other.exponents()).then_some((factor, offset))
+        let factor = self.factor / other.factor;
+        let offset = (self.offset - other.offset) / other.factor;
+        let size = (self.offset.abs() + other.offset.abs()) / other.factor.abs();
+        let conversion = (shortest(factor, factor.abs()), shortest(offset, size));
+        (self.exponents() == other.exponents()).then_some(conversion)
     }
 }
 
-/// Largest product of numerator and denominator of a simple fraction: 2^40.
-const LARGEST_PRODUCT: f64 = 1_099_511_627_776.0;
-/// The integers up to 2^53 are exact as `f64`.
-const LARGEST_EXACT: f64 = 9_007_199_254_740_992.0;
-
-/// A fraction: numerator and denominator, which are integers.
-type Fraction = [f64; 2];
-
-/// Returns the fraction to which `number` is the nearest `f64`, by its continued fraction; `None` if the product of
-/// numerator and denominator is above [`LARGEST_PRODUCT`]. Few numbers have such a fraction by coincidence.
-fn fraction(number: f64) -> Option<Fraction> {
-    let (mut numerators, mut denominators) = ([0.0, 1.0_f64], [1.0, 0.0_f64]);
-    let mut rest = number;
-    while rest.is_finite() {
-        let whole = rest.floor();
-        numerators = [numerators[1], whole * numerators[1] + numerators[0]];
-        denominators = [denominators[1], whole * denominators[1] + denominators[0]];
-        let (numerator, denominator) = (numerators[1], denominators[1]);
-        if numerator.abs() * denominator > LARGEST_PRODUCT {
-            return None;
-        }
-        if (numerator / denominator).to_bits() == number.to_bits() {
-            return Some([numerator, denominator]);
-        }
-        rest = 1.0 / (rest - whole);
-    }
-    None
-}
-
-/// Returns `combined` of the fractions of `a` and `b`, rounded once; `plain` if they have none, or if an integer of the
-/// result is not exact.
-fn rounded_once(a: f64, b: f64, plain: f64, combined: fn(Fraction, Fraction) -> Fraction) -> f64 {
-    let Some((a, b)) = fraction(a).zip(fraction(b)) else { return plain };
-    let [numerator, denominator] = combined(a, b);
-    let is_exact = numerator.abs().max(denominator.abs()) <= LARGEST_EXACT;
-    if is_exact { numerator / denominator } else { plain }
-}
-
-fn quotient(a: f64, b: f64) -> f64 {
-    rounded_once(a, b, a / b, |a, b| [a[0] * b[1], a[1] * b[0]])
-}
-
-fn difference(a: f64, b: f64) -> f64 {
-    rounded_once(a, b, a - b, |a, b| [a[0] * b[1] - b[0] * a[1], a[1] * b[1]])
+/// Returns the decimal with the fewest digits, at most 15, that differs from `number` by no more than the rounding error
+/// of numbers of this `size`; without one, `number`.
+fn shortest(number: f64, size: f64) -> f64 {
+    let decimals = (0..15).filter_map(|digits| format!("{number:.digits$e}").parse().ok());
+    let mut within =
+        decimals.filter(|decimal: &f64| (decimal - number).abs() <= f64::EPSILON * size);
+    within.next().unwrap_or(number)
 }
 
 /// `DisplayUnit`: `display = factor * unit + offset`, without the offset for a
