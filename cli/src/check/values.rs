@@ -94,9 +94,7 @@ pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Va
     let kind = ValueType::of(&variable.kind);
     match master::read_value(slave, variable.value_reference, kind) {
         // This is a limit of the importer, not a fault of the FMU.
-        Err(CallError { failure: Failure::InvalidAnswer(text), .. })
-            if text.contains("that the importer cannot represent") =>
-        {
+        Err(CallError { failure: Failure::Unrepresentable(_), .. }) => {
             Ok(Value(master::Value::String(BEYOND.to_owned())))
         }
         read => read.map(Value),

@@ -480,6 +480,9 @@ pub enum Failure {
     /// The function returned an impossible result; the text describes it.
     #[error("{0}")]
     InvalidAnswer(String),
+    /// The function returned a value that the importer cannot represent; the text describes it.
+    #[error("{0}")]
+    Unrepresentable(String),
 }
 
 /// Returns the error [`Failure::Missing`] for `function`.

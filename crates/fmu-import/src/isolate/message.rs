@@ -37,6 +37,7 @@ enum RemoteFailure {
     TimedOut(f64),
     Panicked(String),
     InvalidAnswer(String),
+    Unrepresentable(String),
 }
 
 /// Returns the first [`TEXT`] bytes of `text`; a character that is cut becomes U+FFFD.
@@ -53,6 +54,7 @@ impl From<CallError> for RemoteError {
             Failure::TimedOut(seconds) => RemoteFailure::TimedOut(*seconds),
             Failure::Panicked(text) => RemoteFailure::Panicked(clipped(text)),
             Failure::InvalidAnswer(text) => RemoteFailure::InvalidAnswer(clipped(text)),
+            Failure::Unrepresentable(text) => RemoteFailure::Unrepresentable(clipped(text)),
             // All other failures are ends of a process, which only the master reports.
             other => RemoteFailure::InvalidAnswer(other.to_string()),
         };
@@ -72,6 +74,7 @@ impl RemoteError {
             RemoteFailure::TimedOut(seconds) => Failure::TimedOut(seconds),
             RemoteFailure::Panicked(text) => Failure::Panicked(text),
             RemoteFailure::InvalidAnswer(text) => Failure::InvalidAnswer(text),
+            RemoteFailure::Unrepresentable(text) => Failure::Unrepresentable(text),
         };
         let function = known_name(&self.function).unwrap_or(function.name(version));
         CallError { function, failure, messages: self.messages }
@@ -115,6 +118,7 @@ mod tests {
             Failure::TimedOut(0.25),
             Failure::Panicked("index 4".to_owned()),
             Failure::InvalidAnswer("returned fmi2Discard".to_owned()),
+            Failure::Unrepresentable("2^63".to_owned()),
         ];
         for failure in failures {
             let messages = ["first", "", "zweite Äußerung"].map(str::to_owned).to_vec();

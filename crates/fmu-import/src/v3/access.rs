@@ -8,7 +8,7 @@ use super::modes::Mode;
 use super::plan::Run;
 use super::unknown;
 use crate::error::refused;
-use slave::CallError;
+use slave::{CallError, Failure};
 
 impl Instance {
     /// Performs `action` for each run (C call) of the plan of a list; an error if a reference belongs to no variable.
@@ -46,15 +46,17 @@ impl Instance {
             for &(position, place) in &run.places {
                 if fill(&run.buffer, place, &mut values[position]).is_none() {
                     let (name, kind) = (instance.view.name(list[position]), run.kind.name());
-                    let what = if run.kind == NativeType::UInt64 {
-                        format!(
+                    let failure = if run.kind == NativeType::UInt64 {
+                        Failure::Unrepresentable(format!(
                             "gives {name} a value of type {kind} that the importer cannot \
                              represent: it has 64 bits with a sign"
-                        )
+                        ))
                     } else {
-                        format!("cannot read {name}, a variable of type {kind}")
+                        let what = format!("cannot read {name}, a variable of type {kind}");
+                        Failure::InvalidAnswer(what)
                     };
-                    return Err(refused(run.kind.getter(), what));
+                    let function = run.kind.getter();
+                    return Err(CallError { function, failure, messages: Vec::new() });
                 }
             }
             Ok(())
