@@ -356,7 +356,9 @@ class Controller:
             path: the file to write.
             base: the packed filter from which it is made, ``KalmanFilter.fmu`` of ``aso-ftc pack fmu-kalman``.
         """
-        self._designed.kalman_fmu(os.fspath(base), os.fspath(path))
+        note = self._designed.kalman_fmu(os.fspath(base), os.fspath(path))
+        if note is not None:
+            warnings.warn(note, stacklevel=2)
         return os.fspath(path)
 
     def feedback_fmu(self, path: PathLike, *, base: PathLike | None = None) -> str:

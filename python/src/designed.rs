@@ -157,9 +157,15 @@ impl Designed {
         Ok((code.files, code.warnings))
     }
 
-    /// Writes the Kalman filter with the plant's FMU to `path`, from the packed filter at `base`.
-    fn kalman_fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
-        detached(py, || self.with(|design| design.kalman_fmu(&base)?.write(&path, &design.page())))
+    /// Writes the Kalman filter with the plant's FMU to `path`, from the packed filter at `base`. Returns the warning of
+    /// the noise that the filter assumes, if there is one.
+    fn kalman_fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<Option<String>> {
+        detached(py, || {
+            self.with(|design| {
+                design.kalman_fmu(&base)?.write(&path, &design.page())?;
+                Ok(design.kalman_warning())
+            })
+        })
     }
 
     /// Writes the controller that uses the estimates of `kalman_fmu` to `path`, from the packed controller at `base`.
