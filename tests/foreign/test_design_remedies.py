@@ -107,7 +107,7 @@ observer.bandwidth = 0.52
 def test_units_remove_a_peak_that_comes_from_signals_without_units(aso_ftc, tmp_path):
     _, report = design_and_report(aso_ftc, tmp_path, AIRCRAFT)
     (remedy,) = report["verdict"]["remedies"]
-    assert report["verdict"]["level"] == "red" and remedy["change"].startswith("state the `unit` of each measurement")
+    assert report["verdict"]["level"] == "red" and remedy["change"].startswith("state the unit of each measurement")
     units = 'measurements = [{ name = "pitch", unit = "rad" }, { name = "speed", unit = "ft/s" }]\n'
     _, report = design_and_report(aso_ftc, tmp_path, AIRCRAFT + units)
     output = report["robustness"]["points"][1]
@@ -146,7 +146,7 @@ def test_the_lines_that_follow_a_reason_of_the_verdict_give_the_stated_peaks(aso
     for remedy in remedies:
         names = {line.split(" = ")[0] for line in remedy["lines"]}
         if names == {"loop.bandwidth"}:
-            assert "in place of `feedback` and `observer`" in remedy["change"]
+            assert "in place of feedback and observer" in remedy["change"]
             names |= {"feedback.bandwidth", "observer.bandwidth"}
         changed = [line for line in plant.splitlines() if line.split(" = ")[0] not in names]
         _, other = design_and_report(aso_ftc, tmp_path, "\n".join([*remedy["lines"], *changed]))

@@ -701,16 +701,16 @@ fn parameters_within_their_tolerances_that_destabilise_make_a_design_red() {
 #[test]
 fn there_is_no_remedy_where_no_other_design_is_tried() {
     let text = format!("{MASS}robustness.amber = 1.6\n");
-    let (figures, budget) = read(&text, |file| {
-        let nominal = design(file).unwrap().nominal;
+    let nominal = read(&text, |file| design(file).unwrap().nominal).unwrap();
+    let examine = |file: &PlantFile<'_>| {
         robustness(&nominal, &file.robustness, None, &TimeLimits::default(), &unobserved()).unwrap()
-    })
-    .unwrap();
+    };
+    let (figures, budget) = read(&text, examine).unwrap();
     let plant = text.replace("feedback.eigenvalues = [-1, -2]\n", "");
     let plant = plant.replace("observer.eigenvalues = [-5, { re = -6, im = 2.5 }]\n", "");
     let sampled = "sample_time = 0.1\nfeedback.sampled_eigenvalues = [0.8, 0.9]\n\
                    observer.sampled_eigenvalues = [0.5, 0.6, 0.7]";
-    let count = |file: &PlantFile<'_>| remedies(file, figures.as_ref(), &budget).len();
+    let count = |file: &PlantFile<'_>| remedies(file, &nominal, figures.as_ref(), &budget).len();
     assert!(read(&text, count).unwrap() > 0);
     for requirement in ["loop.bandwidth = 1", sampled] {
         assert_eq!(read(&format!("{plant}{requirement}\n"), count).unwrap(), 0);

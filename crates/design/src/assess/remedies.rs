@@ -104,7 +104,7 @@ fn of_units(nominal: &Solution, robustness: &Robustness, limits: &RobustnessLimi
         let is_within = point.s_peak_scaled <= limits.amber;
         let (_, reason) = peak_reason(point, limits).filter(|_| is_unknown && is_within)?;
         let change = format!(
-            "state the `unit` of each {kind}: if they differ, the peak of S at the {} is judged in the units that make \
+            "state the unit of each {kind}: if they differ, the peak of S at the {} is judged in the units that make \
              it least, {}",
             point.point,
             rounded(point.s_peak_scaled)
@@ -132,7 +132,7 @@ fn shaped(file: &PlantFile<'_>, varies: bool) -> Option<Trial> {
     }
     other.loop_shape = Some(shape);
     Some(Trial {
-        words: format!("`{line}` in place of `feedback` and `observer`"),
+        words: format!("{line} in place of feedback and observer"),
         lines: vec![line],
         judged: judged(&other, varies)?,
         distance: f64::INFINITY,
