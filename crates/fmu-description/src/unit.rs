@@ -69,7 +69,7 @@ impl BaseUnit {
 
     /// Returns factor and offset of the conversion from this unit to `other`, `value_in_other = factor * value +
     /// offset`; `None` if the exponents differ. A [difference](crate::RealType::is_relative) is
-    /// converted by the factor alone. Both are the shortest decimals within their rounding errors, so that 1 m/s is
+    /// converted by the factor alone. Short decimals within the rounding errors count, so that 1 m/s is
     /// 3.6 km/h, not 3.5999999999999996 km/h.
     #[must_use]
     pub fn conversion(&self, other: &BaseUnit) -> Option<(f64, f64)> {
@@ -81,10 +81,10 @@ impl BaseUnit {
     }
 }
 
-/// Returns the decimal with the fewest digits, at most 15, that differs from `number` by no more than the rounding error
-/// of numbers of this `size`; without one, `number`.
+/// Returns the decimal with the fewest digits, at most 12, that differs from `number` by no more than the rounding error
+/// of numbers of this `size`; without one, `number`. With more digits, numbers such as pi / 180 would lose their last.
 fn shortest(number: f64, size: f64) -> f64 {
-    let decimals = (0..15).filter_map(|digits| format!("{number:.digits$e}").parse().ok());
+    let decimals = (0..12).filter_map(|digits| format!("{number:.digits$e}").parse().ok());
     let mut within =
         decimals.filter(|decimal: &f64| (decimal - number).abs() <= f64::EPSILON * size);
     within.next().unwrap_or(number)
