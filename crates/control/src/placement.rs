@@ -25,6 +25,7 @@ use eigenvectors::{
 use figures::FeedbackLoop;
 use nalgebra::{Complex, DMatrix, DVector};
 use pole_block::pole_blocks;
+use pole_error::Eigenvectors;
 use standard::standard_directions;
 use subspace::AssignableSubspaces;
 
@@ -268,10 +269,14 @@ impl PlacementProblem<'_> {
             }
         }
         let placement = |assignable: &Assignable, directions: &[DVector<f64>], gain| {
+            let v = assignable.eigenvectors(directions, &scale);
+            let balanced_condition = condition(&v)?;
+            let vectors = Eigenvectors { v, units: &scale, condition: balanced_condition };
+            let blocks = assignable.problem.spaces.iter().map(|space| space.poles);
             let quality = Quality {
                 condition: condition(&assignable.eigenvectors(directions, &ones))?,
-                balanced_condition: condition(&assignable.eigenvectors(directions, &scale))?,
-                pole_error: self.pole_error(&gain)?,
+                balanced_condition,
+                pole_error: self.pole_error(&gain, &vectors, blocks)?,
             };
             Ok::<_, Error>(Placement { gain, quality })
         };

@@ -2,9 +2,10 @@
 
 use super::affine::Affine;
 use super::coordinates::{Coordinates, time_unit, unit_near};
-use super::definite::{AccurateProduct, margin};
+use super::definite::margin;
 use super::region::MARGIN;
 use super::{Outcome, Problem};
+use crate::product::AccurateProduct;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;

@@ -1,13 +1,14 @@
 //! An ellipsoid that contains the reachable states of a family of systems.
 
 use super::coordinates::{Coordinates, time_unit, unit_near};
-use super::definite::{AccurateProduct, margin};
+use super::definite::margin;
 use super::lower_bound::product_trace;
 use super::region::MARGIN;
 use super::{Affine, Outcome, Problem};
 use crate::blocks::symmetric_part;
 use crate::check::as_number;
 use crate::lyapunov::{CONTINUOUS, DISCRETE};
+use crate::product::AccurateProduct;
 use crate::stability::instability;
 use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};

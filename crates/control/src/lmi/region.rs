@@ -2,10 +2,11 @@
 
 use super::affine::Affine;
 use super::coordinates::Coordinates;
-use super::definite::{AccurateProduct, margin};
+use super::definite::margin;
 use super::{Outcome, Problem};
 use crate::domain::Domain;
 use crate::eigen::eigenvalues;
+use crate::product::AccurateProduct;
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix};
 use std::slice::from_ref;

@@ -1,12 +1,13 @@
 //! The certificate of a loop that depends on a scheduling variable.
 
 use super::coordinates::{Coordinates, time_unit};
-use super::definite::{AccurateProduct, margin};
+use super::definite::margin;
 use super::region::MARGIN;
 use super::vertices::order;
 use super::{Affine, Problem};
 use crate::check::as_number;
 use crate::eigen::eigenvalues;
+use crate::product::AccurateProduct;
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 

@@ -1,6 +1,5 @@
 //! Requested eigenvalues, grouped into real ones and conjugate pairs.
 
-use super::pole_error::distance;
 use crate::Error;
 use nalgebra::{Complex, DMatrix};
 
@@ -55,4 +54,9 @@ pub(crate) fn pole_blocks(poles: &[Complex<f64>], inputs: usize) -> Result<Vec<P
         |x: &Complex<f64>, y: &Complex<f64>| y.re.total_cmp(&x.re).then(x.im.total_cmp(&y.im));
     all.sort_by(|x, y| order(&x.pole, &y.pole));
     Ok(all)
+}
+
+/// |x - y|, without overflow of the squares.
+pub(super) fn distance(x: Complex<f64>, y: Complex<f64>) -> f64 {
+    (x.re - y.re).hypot(x.im - y.im)
 }

@@ -1,9 +1,10 @@
 //! Theorem 1 with a free matrix P in place of the solution of (12).
 
 use super::{ENLARGEMENTS, check_system};
-use crate::lmi::definite::{AccurateProduct, margin};
+use crate::lmi::definite::margin;
 use crate::lmi::{Affine, Outcome, Problem, norm_below};
 use crate::lyapunov::lyapunov;
+use crate::product::AccurateProduct;
 use crate::stability::instability;
 use crate::svd::norm_2;
 use crate::{Domain, Error};

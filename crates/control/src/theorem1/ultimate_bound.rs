@@ -3,8 +3,9 @@
 use super::{ENLARGEMENTS, check_system};
 use crate::blocks::symmetric_part;
 use crate::lmi::Outcome;
-use crate::lmi::definite::{AccurateProduct, margin};
+use crate::lmi::definite::margin;
 use crate::lyapunov::lyapunov;
+use crate::product::AccurateProduct;
 use crate::stability::instability;
 use crate::svd::norm_2;
 use crate::{Domain, Error};
