@@ -11,6 +11,8 @@ const KEYS: [&str; 7] =
     ["bandwidth", "set_point", "peak", "roll_off", "effort", "structure", "pairs"];
 /// Entries of the file that are not possible together with `[loop]`.
 const OTHERS: [&str; 6] = ["feedback", "observer", "schedule", "family", "estimation", "D"];
+/// Smallest |S| required at low frequencies, relative to `peak`; the same for |T| at high frequencies.
+pub const FLOOR: f64 = 0.01;
 /// Default of `peak`.
 const PEAK: f64 = 1.5;
 /// Default of `roll_off`, relative to the bandwidth.
@@ -83,6 +85,22 @@ impl LoopShape {
     pub fn with_bandwidth(bandwidth: f64, place: Place) -> Self {
         let (set_point, roll_off) = (SET_POINT * bandwidth, ROLL_OFF * bandwidth);
         Self { bandwidth, set_point, peak: PEAK, roll_off, effort: None, pid: None, place }
+    }
+
+    /// This shape with another bandwidth, in rad/s; `set_point` and `roll_off` follow if they have their default values.
+    #[must_use]
+    pub fn at_bandwidth(&self, bandwidth: f64) -> Self {
+        let usual = Self::with_bandwidth(self.bandwidth, self.place.clone());
+        let other = Self::with_bandwidth(bandwidth, self.place.clone());
+        let follow = |value: f64, usual: f64, other: f64| {
+            if value.to_bits() == usual.to_bits() { other } else { value }
+        };
+        Self {
+            bandwidth,
+            set_point: follow(self.set_point, usual.set_point, other.set_point),
+            roll_off: follow(self.roll_off, usual.roll_off, other.roll_off),
+            ..self.clone()
+        }
     }
 
     /// Whether the bandwidth is slow enough for samples every `period` seconds.

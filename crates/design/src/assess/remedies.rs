@@ -21,6 +21,8 @@ use plant_file::signals::Signal;
 const FACTORS: [f64; 8] = [SLOWEST, 0.4, 0.6, 0.8, 1.25, 1.7, 2.5, FASTEST];
 const SLOWEST: f64 = 0.25;
 const FASTEST: f64 = 4.0;
+/// The same for the shape of the loop, which takes longer.
+const OF_SHAPE: [f64; 4] = [SLOWEST, 0.5, 2.0, FASTEST];
 /// Exponent with which a weight of commands or measurements changes with the factor on the speed, as for a double
 /// integrator.
 const WEIGHT_POWER: i32 = -4;
@@ -34,7 +36,7 @@ const LOWER: f64 = 0.95;
 /// Returns a remedy for each peak of S above its limit, and for instability within the tolerances.
 ///
 /// These are the units of signals that have none; slower or faster loops; and the shape of the loop, where no speed makes
-/// the verdict green. Other loops are not tried for gains by linear matrix inequalities or by the shape of the loop, for
+/// the verdict green. Other loops are not tried for gains by linear matrix inequalities, for controllers of low order, for
 /// requirements that are not scaled, for several plants or a large one, and without time.
 pub(crate) fn remedies(
     file: &PlantFile<'_>,
@@ -61,12 +63,11 @@ pub(crate) fn remedies(
     let searched = [&file.feedback, &file.observer].iter().any(|request| {
         matches!(request.requirement, Requirement::Region(_) | Requirement::HInfinity { .. })
     });
-    // Gains by the shape of the loop do not depend on the requirements on feedback and observer.
-    let single =
-        !searched && file.loop_shape.is_none() && file.family.is_empty() && file.schedule.is_none();
+    let single = !searched && file.family.is_empty() && file.schedule.is_none();
     let order = robustness.tolerance.worst.first().map_or(0, |a| a.values.len());
     let variants = if single { variants(file) } else { Vec::new() };
-    if reasons.is_empty() || variants.is_empty() || order > LARGEST_ORDER || budget.is_over() {
+    let largest = if file.loop_shape.is_some() { LARGEST_SHAPED } else { LARGEST_ORDER };
+    if reasons.is_empty() || variants.is_empty() || order > largest || budget.is_over() {
         return remedies;
     }
     let present = Present {
@@ -77,12 +78,18 @@ pub(crate) fn remedies(
     let varies = limits.parameters.is_empty();
     let tried = variants
         .into_par_iter()
-        .map(|variant| (!budget.is_over()).then(|| variant.trial(file, varies)))
+        .map(|variant| {
+            let tried = || budget.run(|| variant.trial(file, varies));
+            let trial = (!budget.is_over()).then(tried)?;
+            // A search for the shape of the loop that was abandoned gives other gains than its lines.
+            (file.loop_shape.is_none() || !budget.is_over()).then_some(trial)
+        })
         .collect::<Vec<_>>();
     let is_complete = tried.iter().all(Option::is_some);
     let mut trials: Vec<_> = tried.into_iter().flatten().flatten().collect();
     trials.sort_by(|one, other| one.distance.total_cmp(&other.distance));
-    if order <= LARGEST_SHAPED && !trials.iter().any(|trial| trial.judged.is_green(limits)) {
+    let has_other_gains = file.loop_shape.is_none() && order <= LARGEST_SHAPED;
+    if has_other_gains && !trials.iter().any(|trial| trial.judged.is_green(limits)) {
         let shaped = budget.run(|| shaped(file, varies));
         trials.extend(shaped.filter(|_| !budget.is_over()));
     }
@@ -174,6 +181,7 @@ struct Present {
 struct Variant {
     observer: Option<Scaled>,
     feedback: Option<Scaled>,
+    shape: Option<LoopShape>,
     factor: f64,
 }
 
@@ -194,17 +202,27 @@ struct Trial {
     distance: f64,
 }
 
-/// The variants of `file` with one loop, or both, slower or faster by each of [`FACTORS`].
+/// The variants of `file` with one loop, or both, slower or faster by each of [`FACTORS`], or with another bandwidth of
+/// the shape of the loop; none for controllers of low order.
 fn variants(file: &PlantFile<'_>) -> Vec<Variant> {
+    if let Some(shape) = &file.loop_shape {
+        let with_factor = |factor: f64| {
+            let shape = shape.at_bandwidth(as_shown(factor * shape.bandwidth));
+            let suits = file.sampling.is_none_or(|sampling| shape.suits(sampling.period));
+            let shape = Some(shape).filter(|shape| suits && shape.pid.is_none())?;
+            Some(Variant { observer: None, feedback: None, shape: Some(shape), factor })
+        };
+        return OF_SHAPE.into_iter().filter_map(with_factor).collect();
+    }
     let with_factor = |factor: f64| {
         let observer = scaled("observer", "V", &file.observer.requirement, factor);
         let feedback = scaled("feedback", "R", &file.feedback.requirement, factor);
         let both = observer.is_some() && feedback.is_some();
         let mut all = vec![
-            Variant { observer: observer.clone(), feedback: None, factor },
-            Variant { observer: None, feedback: feedback.clone(), factor },
+            Variant { observer: observer.clone(), feedback: None, shape: None, factor },
+            Variant { observer: None, feedback: feedback.clone(), shape: None, factor },
         ];
-        all.extend(both.then_some(Variant { observer, feedback, factor }));
+        all.extend(both.then_some(Variant { observer, feedback, shape: None, factor }));
         all.retain(|variant| variant.observer.is_some() || variant.feedback.is_some());
         all
     };
@@ -265,8 +283,18 @@ fn chosen(name: &str, requirement: &Requirement) -> Option<String> {
 impl Variant {
     /// Designs the variant and examines its loop; None if there is no design, or its loop is not stable.
     fn trial(self, file: &PlantFile<'_>, varies: bool) -> Option<Trial> {
-        let Self { observer, feedback, factor } = self;
+        let Self { observer, feedback, shape, factor } = self;
         let mut other = file.clone();
+        if let Some(shape) = shape {
+            let line = format!("loop.bandwidth = {}", rounded(shape.bandwidth));
+            other.loop_shape = Some(shape);
+            return Some(Trial {
+                words: format!("loop.bandwidth {factor} times as large"),
+                lines: vec![line],
+                judged: judged(&other, varies)?,
+                distance: factor.ln().abs(),
+            });
+        }
         if let Some(observer) = &observer {
             other.observer.requirement = observer.requirement.clone();
         }

@@ -1,6 +1,7 @@
 //! What no controller of a plant can reach: the peak of S that unstable modes, zeros and samples force.
 
 use control::eigen::eigenvalues;
+use control::faults::FaultEntry;
 use control::zeros::zeros;
 use control::{Domain, StateSpace};
 use files::PlaceError;
@@ -10,6 +11,7 @@ use crate::Error;
 use crate::plant::linear::LinearPlant;
 use crate::report::number::rounded;
 use plant_file::PlantFile;
+use plant_file::loop_shape::{FLOOR, LoopShape};
 use plant_file::requirements::Requirement;
 
 /// Real part of a zero or pole, relative to its modulus, above which it counts as positive.
@@ -26,6 +28,7 @@ const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// continuous, one command and one measurement, for a zero z:  max |S| >= M = product over unstable p of |z + p*| / |z - p|
 ///     for a real z and |S| <= s = 1/sqrt(2) up to w:          max |S| >= M^t s^(1 - t),  t = pi / (pi - 2 atan(w / z))
 ///     with a delay d:                                         max |S| >= max |T| - 1 >= exp(d Re p) - 1
+/// with the weight W of S by the shape of a loop:             gamma >= M |W(z)|
 /// sampled every h, m commands:                                max |S| >= exp(h sum of Re p / m)
 /// ```
 ///
@@ -88,7 +91,11 @@ pub(crate) fn warnings(
             least => allowed(*zero, least, limit),
         };
         if let Some(zero) = of_zeros.min_by(|x, y| rank(x).total_cmp(&rank(y))) {
-            warnings.extend(of_zero(file, zero, &poles, limit));
+            let mut models = linear.models.iter();
+            let integrates = models.any(|model| !matches!(model.entry, FaultEntry::Sensor(_)));
+            // Without an estimate that acts as an integral, the bandwidth limits no S.
+            let shape = file.loop_shape.as_ref().filter(|_| integrates);
+            warnings.extend(of_zero(file, shape, zero, &poles, limit));
         }
     }
     Ok(warnings)
@@ -103,10 +110,11 @@ pub(crate) fn rates(a: &DMatrix<f64>, domain: Domain) -> Result<Vec<Complex<f64>
     })
 }
 
-/// Returns the warning of a zero in the right half plane, for the plant or for the requested feedback; None if both
-/// allow a peak of S within the limit.
+/// Returns the warning of a zero in the right half plane, for the plant, for the shape of the loop or for the requested
+/// feedback; None if they allow a peak of S within the limit.
 fn of_zero(
     file: &PlantFile<'_>,
+    shape: Option<&LoopShape>,
     zero: Complex<f64>,
     poles: &[Complex<f64>],
     limit: f64,
@@ -125,6 +133,9 @@ fn of_zero(
         );
         return Some(file.error(&["C", "measurements"], message));
     }
+    if let Some(shape) = shape.filter(|_| zero.im == 0.0) {
+        return Some(file.error_at(&shape.place, of_shape(shape, zero.re, least, &name)?));
+    }
     let speed = requested(file)?;
     let reached = least_peak(zero, least, speed);
     if zero.im != 0.0 || reached <= limit {
@@ -138,6 +149,23 @@ fn of_zero(
         rounded(allowed(zero, least, limit))
     );
     Some(file.error_at(&file.feedback.place, message))
+}
+
+/// Returns the sentence that a real zero, called `name`, allows no gamma up to 1 with the weight
+/// W = (s / peak + w) / (s + [`FLOOR`] w), w = `bandwidth`; None if it does. `least`: the result of [`forced`].
+fn of_shape(shape: &LoopShape, zero: f64, least: f64, name: &str) -> Option<String> {
+    let LoopShape { bandwidth, peak, .. } = *shape;
+    let gamma = least * (zero / peak + bandwidth) / (zero + FLOOR * bandwidth);
+    // Within the limit after rounding to five digits.
+    let allowed = 0.9999 * zero * (1.0 - least / peak) / (least - FLOOR);
+    let allowed = if allowed > 0.0 {
+        format!("a `bandwidth` of at most {} rad/s", rounded(allowed))
+    } else {
+        format!("a `peak` above {} only", rounded(least))
+    };
+    (gamma > 1.0).then(|| {
+        format!("no controller has a gamma below {}: {name} allows {allowed}", rounded(gamma))
+    })
 }
 
 /// Returns the peak of S that a zero forces beside unstable `poles`; 1 without unstable poles.
@@ -217,6 +245,24 @@ mod tests {
             read(&format!("{text}{eigenvalues}\n"), all).unwrap().unwrap().len()
         };
         assert_eq!([count("[0.5, 0.5]"), count("[0, 0]")], [1, 0]);
+    }
+
+    /// The plant (2 - s) / (s + 1)^2: (2 / 1.5 + 6) / (2 + 0.06) = 3.5599; 2 (1 - 1 / 1.5) / 0.99 = 0.6734.
+    #[test]
+    fn a_zero_limits_the_shape_of_a_loop() {
+        let warned = |rows: &str| {
+            let text = "A = [[0, 1], [-1, -2]]\nB = [[0], [1]]\nC = [[2, -1]]\nactuator_faults = \"all\"\n\
+                        [loop]\nbandwidth = ";
+            let all = |file: &PlantFile<'_>| warnings(file, &LinearPlant::of(file).unwrap());
+            let all = read(&format!("{text}{rows}\n"), all).unwrap().unwrap();
+            all.first().map(|warning| warning.message().to_owned())
+        };
+        let expected = "no controller has a gamma below 3.5599: its zero at 2 1/s allows a `bandwidth` of at most \
+                        0.67333 rad/s";
+        assert_eq!(warned("6").as_deref(), Some(expected));
+        assert_eq!(warned("0.673"), None);
+        let expected = "no controller has a gamma below 1.2469: its zero at 2 1/s allows a `peak` above 1 only";
+        assert_eq!(warned("0.5\npeak = 1").as_deref(), Some(expected));
     }
 
     /// The plant (1 - s) (1 - s / 100) / (1 + s)^3: the zero at 100 1/s allows 10 rad/s, the zero at 1 1/s does not.

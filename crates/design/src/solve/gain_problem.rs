@@ -122,7 +122,8 @@ impl GainProblem<'_> {
             let Search { starts, free } = self.search(shape)?;
             let references =
                 file.references.as_ref().filter(|one| one.integral && !one.feedforward);
-            let problem = LoopProblem { shape, model, references, free, gains };
+            let red = file.robustness.red;
+            let problem = LoopProblem { shape, model, references, red, free, gains };
             let ShapedGains { feedback, observer, warning } = problem.tuned(&starts)?;
             return Ok((feedback, observer, warning.map(|text| file.error_at(&shape.place, text))));
         }

@@ -16,12 +16,10 @@ use crate::plant::linear::LinearPlant;
 use crate::report::number::rounded;
 use crate::solve::gain::{GainResult, unique};
 use crate::solve::tracking::LoopModel;
-use plant_file::loop_shape::LoopShape;
+use plant_file::loop_shape::{FLOOR, LoopShape};
 use plant_file::references::References;
 use plant_file::signals::same_unit;
 
-/// Smallest |S| required at low frequencies, relative to the peak of S; the same for |T| at high frequencies.
-const FLOOR: f64 = 0.01;
 /// Number of starts to tune: the starts with the lowest gamma, the largest weighted gain over all terms.
 const TUNED: usize = 4;
 /// Smallest decay rate of the tuned loop, relative to that of its start.
@@ -42,6 +40,8 @@ pub(crate) struct LoopProblem<'a, G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains +
     pub(crate) model: LoopModel<'a>,
     /// References that are integrated and do not act on the commands directly.
     pub(crate) references: Option<&'a References>,
+    /// The peak of S above which the verdict is red.
+    pub(crate) red: f64,
     /// The rows and columns of the entries of feedback and observer that are tuned.
     pub(crate) free: [Vec<(usize, usize)>; 2],
     /// Computes the gains of the controller from the gains of feedback and observer.
@@ -132,8 +132,9 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             feedback: unique(feedback, method.clone()),
             observer: unique(observer, method),
             warning: (peak.gamma > 1.0).then(|| {
-                let help = self.help(&terms[peak.term], peak.frequency);
-                format!("{summary}; expected at most 1: {help} helps")
+                let help = self.help(&terms[peak.term], &peak);
+                let help = help.map_or_else(String::new, |entry| format!(": {entry} helps"));
+                format!("{summary}; expected at most 1{help}")
             }),
         })
     }
@@ -157,10 +158,15 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         gains
     }
 
-    /// Returns the entry of the plant file that relaxes the term which limits gamma at a frequency in rad/s.
-    fn help(&self, term: &Term, frequency: f64) -> &'static str {
-        match term.transfer {
+    /// Returns the entry of the plant file that relaxes the term which limits gamma; None if |S| or |T| is so large
+    /// there that the verdict would be red with another limit, too.
+    fn help(&self, term: &Term, peak: &WeightedPeak) -> Option<&'static str> {
+        let frequency = peak.frequency;
+        let mapped = bilinear_frequency(frequency, self.model.domain);
+        let is_red = peak.gamma > self.red * term.weight.magnitude(mapped);
+        Some(match term.transfer {
             Transfer::Effort => "a higher `effort`",
+            Transfer::Sensitivity(_) | Transfer::Complementary(_) if is_red => return None,
             // A constant weight depends on `peak` alone.
             _ if term.weight.as_constant().is_some() => "a higher `peak`",
             Transfer::Sensitivity(_) if frequency < self.shape.bandwidth => "a lower `bandwidth`",
@@ -169,7 +175,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             Transfer::Sensitivity(_) | Transfer::Complementary(_) | Transfer::Tracking => {
                 "a higher `peak`"
             }
-        }
+        })
     }
 
     /// Returns the controller with its filter and its integrals, in `units`; its inputs are the measurements, then the
