@@ -20,7 +20,8 @@ pub(super) fn bounds(report: &Report) -> Markup {
              the fault, or its rate, stays within plus and minus one. The bound is the gain of the \
              fault times its " code { "bound" } " in the plant file. A constant fault that has a "
             code { "rate_bound" } ", too, has a smaller one if the gain of its rate times "
-            code { "rate_bound" } ", with what the commands leave of the fault, is less."
+            code { "rate_bound" } ", with what the commands leave of the fault, is less; without "
+            code { "bound" } ", if they leave nothing."
         }
         (table_of("Largest values", &report.bounds, &columns))
     }

@@ -423,7 +423,7 @@ pub struct Bound {
     #[schemars(with = "Option<f64>")]
     pub gain_of_rate: f64,
     /// The bound of the error by the bound of the fault or, if it is smaller, by that of its rate; none if the file
-    /// does not state `bound`.
+    /// states neither, or `rate_bound` alone and the commands leave a part of the fault.
     pub largest: Option<f64>,
 }
 

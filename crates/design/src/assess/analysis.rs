@@ -17,6 +17,9 @@ use plant_file::faults::Fault;
 const WIDTH: f64 = 1e-3;
 /// Number of equal parts of a sample time. A fault is constant over each part; the states are read at its start.
 const PARTS: u32 = 16;
+/// If the gain of what the commands leave of a fault is at most this part of the gain of the fault, it is a rounding
+/// error, and nothing is left.
+const NOTHING_LEFT: f64 = 1e-9;
 const POINTS_PER_DECADE: u32 = 20;
 /// Number of outputs that each thread computes between two checks of the time limit.
 const OUTPUTS_AT_ONCE: usize = 64;
@@ -189,6 +192,9 @@ impl<'a> Loops<'a> {
                 let constant = !leaks && self.designed.extended.plant.a_f.row(column).amax() <= 0.0;
                 let by_rate = match (fault.rate_bound, fault.bound) {
                     (Some(rate), Some(bound)) if constant => Some(of_rate * rate + left * bound),
+                    (Some(rate), None) if constant && left <= NOTHING_LEFT * of_fault => {
+                        Some(of_rate * rate)
+                    }
                     _ => None,
                 };
                 let by_size = fault.bound.map(|bound| of_fault * bound);
