@@ -3,6 +3,7 @@
 //! One scalar weight is free; a larger weight gives a slower loop. The weight is chosen so that the loop gain crosses
 //! one at the bandwidth. All other weights are relative to the units of inputs and outputs, see [`NaturalUnits`].
 
+use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns};
 use crate::blocks::to_complex;
 use crate::lyapunov::{CONTINUOUS, DISCRETE};
 use crate::response::{FrequencyPoint, frequency_response};
@@ -23,7 +24,8 @@ const ACCURACY: f64 = 1e-6;
 const SATURATED: f64 = 0.7;
 /// Largest number of steps of the regula falsi.
 const STEPS: usize = 40;
-/// Least entry of the energies h of [`NaturalUnits`], relative to the largest, so that no unit is infinite.
+/// Least entry of the energies h of [`NaturalUnits`], relative to the largest or to the energy of the states, so that no
+/// unit is infinite.
 const FLOOR: f64 = 1e-12;
 /// Factor on a bandwidth that is the frequency of an undamped mode, where the response is infinite.
 const DETUNING: f64 = 1.01;
@@ -37,10 +39,10 @@ const DETUNING: f64 = 1.01;
 /// outputs[j]^2 = 1 / max over i of h[j, i],    inputs[i]^2 = 1 / max over j of outputs[j]^2 h[j, i]
 /// ```
 ///
-/// g is the impulse response without D: C e^(A t) B or C A^k B; T is the sample time. Entries of h below 1e-12 of the
-/// largest are raised to it; if all are zero, all units are 1. The physical sizes of the units do not depend on the
-/// units of states and outputs. Other units of inputs change them by a common factor if one input dominates every
-/// output.
+/// g is the impulse response without D: C e^(A t) B or C A^k B; T is the sample time. An entry of h is raised to 1e-12 of
+/// the largest one or, if that is less, of the energy of the states times the squared row of C, both with states in units
+/// that balance A. If all entries are zero, all units are 1. The physical sizes of the units do not depend on the units
+/// of states and outputs. Other units of inputs change them by a common factor if one input dominates every output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NaturalUnits {
     /// Size of a unit of each input.
@@ -60,9 +62,11 @@ impl NaturalUnits {
         system.check()?;
         check::positive("the rate", rate)?;
         let mut h = energies(system, rate)?;
-        let outputs = DVector::from_fn(h.nrows(), |row, _| 1.0 / h.row(row).max());
+        let inverse = |size: f64, least: f64| 1.0 / if size > 0.0 { size } else { least };
+        let least = FLOOR * h.amax();
+        let outputs = DVector::from_fn(h.nrows(), |row, _| inverse(h.row(row).max(), least));
         h = DMatrix::from_diagonal(&outputs) * h;
-        let inputs = DVector::from_fn(h.ncols(), |column, _| 1.0 / h.column(column).max());
+        let inputs = DVector::from_fn(h.ncols(), |at, _| inverse(h.column(at).max(), FLOOR));
         Ok(Self { inputs: inputs.map(f64::sqrt), outputs: outputs.map(f64::sqrt) })
     }
 }
@@ -79,15 +83,22 @@ fn energies(system: &StateSpace, rate: f64) -> Result<DMatrix<f64>, Error> {
         Domain::Sampled { period } => (&DISCRETE, a * ((-rate * period).exp() / (1.0 + excess))),
     };
     let mut h = DMatrix::zeros(c.nrows(), b.ncols());
-    for (mut column, input) in h.column_iter_mut().zip(b.column_iter()) {
+    // What an output could show of the energy of the states by an input, with balanced states.
+    let mut sizes = h.clone();
+    let scale = Balance::new(a).scale;
+    let rows = multiply_columns(c, &scale);
+    for (at, input) in b.column_iter().enumerate() {
         let gramian = equation.solve(&damped.transpose(), &(input * input.transpose()))?;
-        for (entry, output) in column.iter_mut().zip(c.row_iter()) {
-            *entry = (output * &gramian * output.transpose())[(0, 0)].max(0.0);
+        let size = divide_rows(&divide_columns(&gramian, &scale), &scale).amax();
+        for (row, output) in c.row_iter().enumerate() {
+            h[(row, at)] = (output * &gramian * output.transpose())[(0, 0)].max(0.0);
+            sizes[(row, at)] = rows.row(row).norm_squared() * size;
         }
     }
-    let least = FLOOR * h.amax();
+    let largest = h.amax();
     let h = check::in_range("the energy of the outputs", h)?;
-    Ok(if least > 0.0 { h.map(|entry| entry.max(least)) } else { h.map(|_| 1.0) })
+    let least = |entry: f64, size: f64| entry.max(FLOOR * largest.min(size));
+    Ok(if largest > 0.0 { h.zip_map(&sizes, least) } else { h.map(|_| 1.0) })
 }
 
 /// A regulator or a filter with its loop gain at the bandwidth.

@@ -92,6 +92,26 @@ fn natural_units_follow_the_units_of_outputs() {
     assert!((energy - 1.0).abs() < 2e-3, "{energy}");
 }
 
+/// With `x_i`' = `a_i` `x_i` + `b_i` `u_i` the energies are (`c_ji` `b_i`)^2 / (2 (rate - `a_i`)): here 1e-18 / 6 and 0.25 / 8
+/// in the first row, 0.04e-18 / 6 and 1 / 8 in the second, but for the units of the outputs.
+#[test]
+fn natural_units_follow_units_of_any_size() {
+    let (c, unit) = ([[1.0, 0.5], [0.2, 1.0]], [1e-9, 1e9]);
+    let plant = StateSpace {
+        a: DMatrix::from_diagonal(&DVector::from_vec(vec![-1.0, -2.0])),
+        b: DMatrix::from_diagonal(&DVector::from_vec(vec![1e-9, 1.0])),
+        c: DMatrix::from_fn(2, 2, |row, column| unit[row] * c[row][column]),
+        d: DMatrix::zeros(2, 2),
+        domain: Domain::Continuous,
+    };
+    let NaturalUnits { inputs, outputs } = NaturalUnits::new(&plant, 2.0).unwrap();
+    assert!((inputs[0] / (1e9 * (6.0_f64 / 32.0).sqrt()) - 1.0).abs() < 1e-9, "{inputs}");
+    assert!((inputs[1] - 1.0).abs() < 1e-9, "{inputs}");
+    for (actual, expected) in outputs.iter().zip([32f64.sqrt() * 1e9, 8f64.sqrt() * 1e-9]) {
+        assert!((actual / expected - 1.0).abs() < 1e-9, "{outputs}");
+    }
+}
+
 #[test]
 fn weights_and_units_of_the_wrong_shape_are_refused_by_name() {
     let StateSpace { a, b, c, .. } = carts();
