@@ -165,3 +165,26 @@ def test_the_lines_that_follow_a_reason_of_the_verdict_give_the_stated_peaks(aso
         assert max(peaks) < max(point["judged"] for point in report["robustness"]["points"])
     done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--force")
     assert done.returncode in (0, 1)
+
+
+# A lag behind a delay of 2 s, with an observer that is too fast for it.
+DELAYED = """A = [[-1]]
+B = [[1]]
+C = [[1]]
+actuators = [{ name = "u", delay = 2.0 }]
+actuator_faults = "all"
+feedback.bandwidth = 3.0
+observer.bandwidth = 10.0
+"""
+
+
+def test_a_loop_that_is_not_stable_has_a_remedy_that_makes_it_green(aso_ftc, tmp_path):
+    _, report = design_and_report(aso_ftc, tmp_path, DELAYED)
+    (remedy,) = report["verdict"]["remedies"]
+    assert report["robustness"] is None and remedy["reason"] in report["verdict"]["reasons"]
+    names = {line.split(" = ")[0] for line in remedy["lines"]}
+    unchanged = [line for line in DELAYED.splitlines() if line.split(" = ")[0] not in names]
+    _, other = design_and_report(aso_ftc, tmp_path, "\n".join([*remedy["lines"], *unchanged]))
+    assert other["verdict"]["level"] == "green"
+    for point in other["robustness"]["points"]:
+        assert f"{point['judged']:.3f}"[:4] in remedy["change"], remedy

@@ -75,7 +75,10 @@ pub(crate) fn summarise(report: &Report) {
     }
     println!("verdict: {}", report.verdict.level.word());
     // Checks that fail are printed above.
-    let is_new = |reason: &&String| !reason.starts_with("does not hold: ");
+    let is_new = |reason: &&String| {
+        let mut remedies = report.verdict.remedies.iter();
+        !reason.starts_with("does not hold: ") || remedies.any(|remedy| remedy.reason == **reason)
+    };
     // Consecutive reasons may have the same remedy, which is printed once.
     let mut stated = "";
     for reason in report.verdict.reasons.iter().filter(is_new) {

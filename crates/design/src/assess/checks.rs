@@ -7,6 +7,8 @@ use crate::report::Check;
 use crate::solve::law::measure;
 use crate::solve::solution::Solution;
 
+/// The condition of a design whose loop is stable.
+pub(crate) const STABLE: &str = "plant and controller are stable together";
 /// Relative size of the remaining fault effect below which the compensation counts as complete.
 const CANCELLED: f64 = 1e-9;
 
@@ -25,7 +27,7 @@ pub(crate) fn checks(designed: &Solution) -> Vec<Check> {
     }
     let margin = measure(designed.domain);
     all.push(check(
-        "plant and controller are stable together",
+        STABLE,
         designed.instability < 0.0,
         Some(designed.instability),
         margin.to_owned(),

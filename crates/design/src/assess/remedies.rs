@@ -3,11 +3,12 @@
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
+use crate::assess::checks::STABLE;
 use crate::assess::judged::Judged;
-use crate::assess::verdict::{instability, peak_reason};
+use crate::assess::verdict::{failed, instability, peak_reason};
 use crate::budget::Budget;
 use crate::report::number::rounded;
-use crate::report::robustness::{LoopPoint, Remedy, Robustness};
+use crate::report::robustness::{LoopPoint, Remedy, Robustness, ToleranceResult};
 use crate::solve::designed::design;
 use crate::solve::solution::Solution;
 use plant_file::PlantFile;
@@ -33,7 +34,8 @@ const LARGEST_SHAPED: usize = 8;
 /// Part of the present peak of S below which a change must bring this peak to be proposed.
 const LOWER: f64 = 0.95;
 
-/// Returns a remedy for each peak of S above its limit, and for instability within the tolerances.
+/// Returns a remedy for a loop that is not stable, or for each peak of S above its limit and for instability within the
+/// tolerances.
 ///
 /// These are the units of signals that have none; slower or faster loops; and the shape of the loop, where no speed makes
 /// the verdict green. Other loops are not tried for gains by linear matrix inequalities, for controllers of low order, for
@@ -45,9 +47,10 @@ pub(crate) fn remedies(
     budget: &Budget,
 ) -> Vec<Remedy> {
     let limits = &file.robustness;
-    let Some(robustness) = robustness else { return Vec::new() };
-    let mut remedies = of_units(nominal, robustness, limits);
-    let of_peaks = robustness.points.iter().enumerate();
+    let mut remedies =
+        robustness.map_or_else(Vec::new, |robustness| of_units(nominal, robustness, limits));
+    let points = robustness.map_or(&[][..], |robustness| robustness.points.as_slice());
+    let of_peaks = points.iter().enumerate();
     let mut reasons: Vec<_> = of_peaks
         .filter_map(|(at, point)| {
             let (_, text) = peak_reason(point, limits)?;
@@ -55,8 +58,13 @@ pub(crate) fn remedies(
         })
         .collect();
     // For parameters of an FMU there is no remedy.
-    if robustness.tolerance.is_unstable() && limits.parameters.is_empty() {
-        reasons.push(Reason { text: instability(&robustness.tolerance), aim: Aim::Stable });
+    let tolerance = robustness.map(|robustness| &robustness.tolerance);
+    if let Some(test) = tolerance.filter(|test| test.is_unstable() && limits.parameters.is_empty())
+    {
+        reasons.push(Reason { text: instability(test), aim: Aim::Stable });
+    }
+    if robustness.is_none() {
+        reasons.push(Reason { text: failed(STABLE), aim: Aim::Nominal });
     }
     reasons.retain(|reason| remedies.iter().all(|remedy| remedy.reason != reason.text));
     // Such gains take long to compute.
@@ -64,15 +72,16 @@ pub(crate) fn remedies(
         matches!(request.requirement, Requirement::Region(_) | Requirement::HInfinity { .. })
     });
     let single = !searched && file.family.is_empty() && file.schedule.is_none();
-    let order = robustness.tolerance.worst.first().map_or(0, |a| a.values.len());
+    let worst = tolerance.and_then(|test| test.worst.first());
+    let order = worst.map_or(nominal.linear.undelayed.a.nrows(), |a| a.values.len());
     let variants = if single { variants(file) } else { Vec::new() };
     let largest = if file.loop_shape.is_some() { LARGEST_SHAPED } else { LARGEST_ORDER };
     if reasons.is_empty() || variants.is_empty() || order > largest || budget.is_over() {
         return remedies;
     }
     let present = Present {
-        peaks: robustness.points.iter().map(|point| point.judged).collect(),
-        is_unstable: robustness.tolerance.is_unstable(),
+        peaks: points.iter().map(|point| point.judged).collect(),
+        is_unstable: tolerance.is_none_or(ToleranceResult::is_unstable),
     };
     // A change that lowers a peak must keep the stability within the tolerances.
     let varies = limits.parameters.is_empty();
@@ -169,6 +178,8 @@ enum Aim {
     Peak(usize),
     /// Stability within the tolerances.
     Stable,
+    /// Stability of the loop, which is not stable.
+    Nominal,
 }
 
 /// The loop with the present requirements.
@@ -351,10 +362,11 @@ impl Reason {
         let reached = |trial: &&Trial| match self.aim {
             Aim::Peak(at) => trial.judged.points[at].judged <= limits.amber,
             Aim::Stable => !trial.judged.is_unstable,
+            Aim::Nominal => true,
         };
         let green = trials.iter().find(|trial| trial.judged.is_green(limits));
         let least = match self.aim {
-            Aim::Stable => None,
+            Aim::Stable | Aim::Nominal => None,
             Aim::Peak(at) => {
                 let peak = |trial: &Trial| trial.judged.points[at].judged;
                 let least = harmless().min_by(|x, y| peak(x).total_cmp(&peak(y)));

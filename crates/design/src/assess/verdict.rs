@@ -20,7 +20,7 @@ pub(crate) fn verdict(
     let (level, reasons) = (Level::Green, Vec::new());
     let mut verdict = Verdict { level, reasons, remedies, limits: limits_of_levels };
     for check in checks.iter().filter(|check| !check.holds) {
-        verdict.add(Level::Red, format!("does not hold: {}", check.condition));
+        verdict.add(Level::Red, failed(&check.condition));
     }
     let points = robustness.iter().flat_map(|figures| &figures.points);
     let of_peaks = points.filter_map(|point| peak_reason(point, limits));
@@ -31,6 +31,11 @@ pub(crate) fn verdict(
         verdict.add(level, reason);
     }
     verdict
+}
+
+/// Returns the sentence about a condition that does not hold.
+pub(crate) fn failed(condition: &str) -> String {
+    format!("does not hold: {condition}")
 }
 
 /// Returns the sentence about a peak of S above a limit, with the level of the verdict; None if the peak is within the
