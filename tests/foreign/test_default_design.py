@@ -318,3 +318,20 @@ def test_an_estimate_that_is_much_slower_than_the_feedback_is_a_warning_whose_re
     _, report = design_and_report(aso_ftc, tmp_path, AIRLINER.replace('"all"', '["rudder"]'))
     assert [fault["name"] for fault in report["plant"]["faults"]] == ["f_rudder"] and not report["warnings"]
     assert -max(pole[0] for pole in report["observer"]["eigenvalues"]) > 100 * slowest
+
+
+# The distillation column of S. Skogestad, M. Morari and J. C. Doyle, IEEE Trans. Autom. Control 33 (1988).
+COLUMN = """A = [[-0.0133333333, 0], [0, -0.0133333333]]
+B = [[0.0117066667, -0.01152], [0.0144266667, -0.0146133333]]
+C = [[1, 0], [0, 1]]
+actuator_faults = "all"
+"""
+
+
+def test_a_plant_that_no_bandwidth_makes_robust_keeps_the_speed_of_the_plant(aso_ftc, tmp_path):
+    """Estimates of both faults act as integrals, so that no loop is stable beyond the plant with a singular stationary gain."""
+    _, report = design_and_report(aso_ftc, tmp_path, COLUMN)
+    gain = np.array([[0.878, -0.864], [1.082, -1.096]])
+    ratio = np.sqrt(gain[0, 0] * gain[1, 1] / (gain[0, 1] * gain[1, 0]))
+    assert report["robustness"]["tolerance"]["first_unstable"] == pytest.approx(10 * (ratio - 1) / (ratio + 1), rel=1e-3)
+    assert "a bandwidth of 0.013 rad/s" in report["feedback"]["method"]

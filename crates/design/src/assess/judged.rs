@@ -4,9 +4,13 @@ use std::cmp::Ordering;
 
 use crate::Error;
 use crate::assess::robustness::{Physical, by_entries, loop_points};
-use crate::report::robustness::LoopPoint;
+use crate::report::robustness::{LoopPoint, ToleranceResult};
 use crate::solve::solution::Solution;
 use plant_file::robustness::RobustnessLimits;
+
+/// A loop that is unstable within the tolerances is better than another one if it stays stable for a multiple of them that
+/// is larger by this factor.
+const FARTHER: f64 = 1.1;
 
 /// The peaks of S of a stable loop, and its stability within the tolerances.
 pub(crate) struct Judged {
@@ -14,6 +18,8 @@ pub(crate) struct Judged {
     /// Whether an unstable loop was found for entries of the plant within their tolerances; false if the tolerances
     /// were not examined. Tolerances of FMU parameters do not count.
     pub(crate) is_unstable: bool,
+    /// The multiple of the tolerances from which the loop is unstable; infinite if none was found or examined.
+    pub(crate) unstable_from: f64,
 }
 
 impl Judged {
@@ -29,10 +35,11 @@ impl Judged {
         let closed = physical.closed(&physical.controller)?;
         let linear = &solution.linear;
         let points = loop_points(&closed, &linear.actuators, &linear.measurements)?;
-        let within =
-            |limits| by_entries(linear, &physical, limits).map(|tolerance| tolerance.is_unstable());
-        let is_unstable = tolerances.map_or(Ok(false), within)?;
-        Ok(Some(Self { points, is_unstable }))
+        let within = |limits| by_entries(linear, &physical, limits);
+        let tolerance = tolerances.map(within).transpose()?;
+        let is_unstable = tolerance.as_ref().is_some_and(ToleranceResult::is_unstable);
+        let unstable_from = tolerance.map_or(f64::INFINITY, |test| test.first_unstable);
+        Ok(Some(Self { points, is_unstable, unstable_from }))
     }
 
     /// Whether peaks of S and tolerances allow a green verdict.
@@ -41,16 +48,20 @@ impl Judged {
     }
 
     /// Whether this loop is better than `other`, by the first criterion in which they differ: peaks of S within the
-    /// limit, stability within the tolerances, the lower largest peak.
+    /// limit, stability within the tolerances, if both are not stable within them, the larger
+    /// multiple of them for which the loop is stable, otherwise the lower largest peak.
     pub(crate) fn is_better(&self, other: &Self, limits: &RobustnessLimits) -> bool {
         let rank = |judged: &Self| (judged.largest_peak() > limits.amber, judged.is_unstable);
         match rank(self).cmp(&rank(other)) {
+            Ordering::Equal if self.is_unstable => {
+                self.unstable_from > FARTHER * other.unstable_from
+            }
             Ordering::Equal => self.largest_peak() < other.largest_peak(),
             ordering => ordering.is_lt(),
         }
     }
 
-    fn largest_peak(&self) -> f64 {
+    pub(crate) fn largest_peak(&self) -> f64 {
         self.points.iter().map(|point| point.judged).fold(0.0, f64::max)
     }
 }

@@ -440,7 +440,11 @@ mod tests {
             let trial = Trial {
                 lines: Vec::new(),
                 words: "another observer".to_owned(),
-                judged: Judged { points: Vec::new(), is_unstable: false },
+                judged: Judged {
+                    points: Vec::new(),
+                    is_unstable: false,
+                    unstable_from: f64::INFINITY,
+                },
                 distance: 1.0,
             };
             let reason = Reason { text: "unstable".to_owned(), aim: Aim::Stable };
