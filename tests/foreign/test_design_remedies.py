@@ -188,3 +188,24 @@ def test_a_loop_that_is_not_stable_has_a_remedy_that_makes_it_green(aso_ftc, tmp
     assert other["verdict"]["level"] == "green"
     for point in other["robustness"]["points"]:
         assert f"{point['judged']:.3f}"[:4] in remedy["change"], remedy
+
+
+# The distillation column of S. Skogestad, M. Morari and J. C. Doyle, IEEE Trans. Autom. Control 33 (1988).
+COLUMN = """A = [[-0.0133333333, 0], [0, -0.0133333333]]
+B = [[0.0117066667, -0.01152], [0.0144266667, -0.0146133333]]
+C = [[1, 0], [0, 1]]
+actuator_faults = "all"
+"""
+
+
+def test_fewer_faults_make_a_plant_robust_whose_stationary_gain_is_nearly_singular(aso_ftc, tmp_path):
+    _, report = design_and_report(aso_ftc, tmp_path, COLUMN)
+    assert report["robustness"]["tolerance"]["stable"] < 0.9
+    (remedy,) = report["verdict"]["remedies"]
+    names = {line.split(" = ")[0] for line in remedy["lines"]}
+    assert names == {"actuator_faults", "feedback.bandwidth", "observer.bandwidth"}
+    unchanged = [line for line in COLUMN.splitlines() if line.split(" = ")[0] not in names]
+    _, other = design_and_report(aso_ftc, tmp_path, "\n".join([*remedy["lines"], *unchanged]))
+    assert other["verdict"]["level"] == "green" and len(other["plant"]["faults"]) == 1
+    for point in other["robustness"]["points"]:
+        assert f"{point['judged']:.3f}"[:4] in remedy["change"], remedy

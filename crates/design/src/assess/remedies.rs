@@ -13,6 +13,7 @@ use crate::solve::designed::design;
 use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::estimation::Law;
+use plant_file::faults::{EntryPoint, Fault, FaultDynamics};
 use plant_file::loop_shape::LoopShape;
 use plant_file::requirements::{Bandwidth, Requirement};
 use plant_file::robustness::RobustnessLimits;
@@ -32,7 +33,7 @@ const LARGEST_ORDER: usize = 24;
 /// Largest number of states for which gains by the shape of the loop are tried: for 8 they take some 10 s.
 const LARGEST_SHAPED: usize = 8;
 /// Part of the present peak of S below which a change must bring this peak to be proposed.
-const LOWER: f64 = 0.95;
+const LOWER: f64 = 0.8;
 
 /// Returns a remedy for a loop that is not stable, or for each peak of S above its limit and for instability within the
 /// tolerances.
@@ -102,6 +103,10 @@ pub(crate) fn remedies(
         let shaped = budget.run(|| shaped(file, varies));
         trials.extend(shaped.filter(|_| !budget.is_over()));
     }
+    let is_aim = |reason: &Reason| matches!(reason.aim, Aim::Stable);
+    if reasons.iter().any(is_aim) && trials.iter().all(|trial| trial.judged.is_unstable) {
+        trials.extend(with_fewer_faults(file, varies, budget));
+    }
     let remedy = |reason: Reason| reason.remedy(&trials, is_complete, &present, limits);
     remedies.extend(reasons.into_iter().filter_map(remedy));
     remedies
@@ -153,6 +158,49 @@ fn shaped(file: &PlantFile<'_>, varies: bool) -> Option<Trial> {
         judged: judged(&other, varies)?,
         distance: f64::INFINITY,
     })
+}
+
+/// Designs the file without each of its faults, if there are several, all of actuators and with no entry that refers to
+/// them; None where there is no design. As the estimates of faults act as integrals, no loop with as many of them as
+/// measurements is stable beyond a plant whose stationary gains are singular.
+fn with_fewer_faults(file: &PlantFile<'_>, varies: bool, budget: &Budget) -> Vec<Trial> {
+    let actuator = |fault: &Fault| match fault.entry_point {
+        EntryPoint::Actuator(at) => Some(file.actuators[at].name.clone()),
+        _ => None,
+    };
+    let names = file.faults.iter().map(actuator).collect::<Option<Vec<_>>>();
+    let is_alone = file.detection.is_none() && file.estimation.law == Law::Augmented;
+    let Some(names) = names.filter(|names| is_alone && names.len() > 1) else { return Vec::new() };
+    // A line of the file states faults without further entries.
+    let is_plain = |(fault, name): (&Fault, &String)| {
+        let entries = [fault.bound, fault.rate_bound, fault.step, fault.up_to];
+        let is_constant = fault.dynamics == FaultDynamics::Constant;
+        fault.name == format!("f_{name}") && is_constant && entries.iter().all(Option::is_none)
+    };
+    let has_line = file.faults.iter().zip(&names).all(is_plain);
+    let trial = |at: usize| {
+        let mut other = file.clone();
+        let fault = other.faults.remove(at);
+        if budget.is_over() {
+            return None;
+        }
+        let judged = budget.run(|| judged(&other, varies)).filter(|_| !budget.is_over())?;
+        let remaining: Vec<_> = other.faults.iter().map(|fault| fault.name.as_str()).collect();
+        let words =
+            format!("{} alone, so that {} is not compensated", remaining.join(" and "), fault.name);
+        let names = names.iter().enumerate().filter(|(one, _)| *one != at);
+        let names: Vec<_> = names.map(|(_, name)| format!("\"{name}\"")).collect();
+        let line = has_line.then(|| format!("actuator_faults = [{}]", names.join(", ")));
+        let unchanged = [
+            chosen("observer", &file.observer.requirement),
+            chosen("feedback", &file.feedback.requirement),
+        ];
+        let lines = line.map_or_else(Vec::new, |line| {
+            std::iter::once(line).chain(unchanged.into_iter().flatten()).collect()
+        });
+        Some(Trial { lines, words, judged, distance: f64::INFINITY })
+    };
+    (0..names.len()).into_par_iter().filter_map(trial).collect()
 }
 
 /// Designs the controller of `file` and examines its loop, within the tolerances if `varies`; None if there is no
@@ -348,9 +396,9 @@ impl Trial {
 }
 
 impl Reason {
-    /// Returns the smallest change that removes all reasons, else the smallest one that removes this reason, else for a
-    /// peak the change with the lowest peak, else a sentence that there is none. Changes that make something else worse
-    /// are left out. None if no change removes this reason and the time was over before all were tried.
+    /// Returns the smallest change that removes all reasons, else the smallest one that removes this reason, if possible
+    /// with all peaks, else for a peak the change with the lowest peak, else a sentence that there is none. Changes that
+    /// make something else worse are left out. None if no change removes this reason and the time was over before all were tried.
     fn remedy(
         self,
         trials: &[Trial],
@@ -373,7 +421,10 @@ impl Reason {
                 least.filter(|trial| peak(trial) < LOWER * present.peaks[at])
             }
         };
-        let chosen = green.or_else(|| harmless().find(reached));
+        let has_low_peaks = |trial: &&Trial| trial.judged.largest_peak() <= limits.amber;
+        let chosen = green
+            .or_else(|| harmless().filter(reached).find(has_low_peaks))
+            .or_else(|| harmless().find(reached));
         let untried = if limits.parameters.is_empty() {
             ""
         } else {
