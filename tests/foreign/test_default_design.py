@@ -335,3 +335,16 @@ def test_a_plant_that_no_bandwidth_makes_robust_keeps_the_speed_of_the_plant(aso
     ratio = np.sqrt(gain[0, 0] * gain[1, 1] / (gain[0, 1] * gain[1, 0]))
     assert report["robustness"]["tolerance"]["first_unstable"] == pytest.approx(10 * (ratio - 1) / (ratio + 1), rel=1e-3)
     assert "a bandwidth of 0.013 rad/s" in report["feedback"]["method"]
+
+
+def test_measurements_without_units_do_not_change_bandwidths_of_a_plant_that_is_green_with_units(aso_ftc, tmp_path):
+    a, b, c = PLANTS["quadruple tank"]
+    scaled = (a, b, (np.diag([1e3, 1e-3]) @ c).tolist())
+    units = 'measurements = [{ name = "h1", unit = "mm" }, { name = "h2", unit = "km" }]\n'
+    texts = [f"{written(plant)}actuator_faults = \"all\"\n{more}" for plant, more in ((scaled, ""), (scaled, units), ((a, b, c), ""))]
+    reports = [design_and_report(aso_ftc, tmp_path, text)[1] for text in texts]
+    chosen = [[report[loop]["method"].split(";")[0] for loop in ("feedback", "observer")] for report in reports]
+    assert chosen[0] == chosen[1] == chosen[2], chosen
+    assert [report["verdict"]["level"] for report in reports] == ["red", "green", "green"]
+    (remedy,) = reports[0]["verdict"]["remedies"]
+    assert remedy["change"].startswith("state the unit of each measurement")

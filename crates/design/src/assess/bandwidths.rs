@@ -123,12 +123,14 @@ pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantF
     }
 }
 
-/// Examines the loop of a file, with its tolerances if `varies` and the nominal loop is green; None if it is not
+/// Examines the loop of a file, with its tolerances if `varies` and its peak is within the limit; None if it is not
 /// stable.
 fn judged(file: &PlantFile<'_>, varies: bool) -> Result<Option<Judged>, Error> {
     let nominal = design(file)?.nominal;
     let judged = Judged::of(&nominal, None)?;
-    let varies = varies && judged.as_ref().is_some_and(|judged| judged.is_green(&file.robustness));
+    let limits = &file.robustness;
+    let is_low = |judged: &Judged| judged.peak_of_choice(limits) <= limits.amber;
+    let varies = varies && judged.as_ref().is_some_and(is_low);
     if varies { Judged::of(&nominal, Some(&file.robustness)) } else { Ok(judged) }
 }
 

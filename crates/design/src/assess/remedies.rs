@@ -4,7 +4,7 @@ use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
 use crate::assess::checks::STABLE;
-use crate::assess::judged::Judged;
+use crate::assess::judged::{Judged, have_no_units};
 use crate::assess::verdict::{failed, instability, peak_reason};
 use crate::budget::Budget;
 use crate::report::number::rounded;
@@ -121,7 +121,7 @@ fn of_units(nominal: &Solution, robustness: &Robustness, limits: &RobustnessLimi
         (linear.measurements.as_slice(), "measurement"),
     ];
     let remedy = |(point, (signals, kind)): (&LoopPoint, (&[Signal], &str))| {
-        let is_unknown = signals.len() > 1 && signals.iter().all(|signal| signal.unit.is_none());
+        let is_unknown = have_no_units(signals);
         let is_within = point.s_peak_scaled <= limits.amber;
         let (_, reason) = peak_reason(point, limits).filter(|_| is_unknown && is_within)?;
         let change = format!(
@@ -493,6 +493,7 @@ mod tests {
                 words: "another observer".to_owned(),
                 judged: Judged {
                     points: Vec::new(),
+                    comparable_peak: 0.0,
                     is_unstable: false,
                     unstable_from: f64::INFINITY,
                 },
