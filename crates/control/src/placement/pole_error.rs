@@ -65,7 +65,7 @@ impl PlacementProblem<'_> {
         Eigenvectors { v, units, .. }: &Eigenvectors<'_>,
         blocks: impl Iterator<Item = PoleBlock>,
     ) -> Option<DMatrix<f64>> {
-        let mut m = DMatrix::zeros(v.nrows(), v.ncols());
+        let mut m = DMatrix::<f64>::zeros(v.nrows(), v.ncols());
         let mut first = 0;
         for block in blocks.map(PoleBlock::block) {
             m.view_mut((first, first), block.shape()).copy_from(&block);

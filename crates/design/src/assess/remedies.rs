@@ -398,7 +398,8 @@ impl Trial {
 impl Reason {
     /// Returns the smallest change that removes all reasons, else the smallest one that removes this reason, if possible
     /// with all peaks, else for a peak the change with the lowest peak, else a sentence that there is none. Changes that
-    /// make something else worse are left out. None if no change removes this reason and the time was over before all were tried.
+    /// make something else worse are left out. None if no change removes this reason and the time was over before all
+    /// were tried.
     fn remedy(
         self,
         trials: &[Trial],
