@@ -24,8 +24,8 @@ const ACCURACY: f64 = 1e-6;
 const SATURATED: f64 = 0.7;
 /// Largest number of steps of the regula falsi.
 const STEPS: usize = 40;
-/// Least entry of the energies h of [`NaturalUnits`], relative to the largest or to the energy of the states, so that no
-/// unit is infinite.
+/// Least entry of the energies h of [`NaturalUnits`], relative to the largest or to the energy of the states, so that
+/// no unit is infinite.
 const FLOOR: f64 = 1e-12;
 /// Factor on a bandwidth that is the frequency of an undamped mode, where the response is infinite.
 const DETUNING: f64 = 1.01;
@@ -39,10 +39,11 @@ const DETUNING: f64 = 1.01;
 /// outputs[j]^2 = 1 / max over i of h[j, i],    inputs[i]^2 = 1 / max over j of outputs[j]^2 h[j, i]
 /// ```
 ///
-/// g is the impulse response without D: C e^(A t) B or C A^k B; T is the sample time. An entry of h is raised to 1e-12 of
-/// the largest one or, if that is less, of the energy of the states times the squared row of C, both with states in units
-/// that balance A. If all entries are zero, all units are 1. The physical sizes of the units do not depend on the units
-/// of states and outputs. Other units of inputs change them by a common factor if one input dominates every output.
+/// g is the impulse response without D: C e^(A t) B or C A^k B; T is the sample time. An entry of h is raised to 1e-12
+/// of the largest one or, if that is less, of the energy of the states times the squared row of C, both with states in
+/// units that balance A. If all entries are zero, all units are 1. The physical sizes of the units do not depend on
+/// the units of states and outputs. Other units of inputs change them by a common factor if one input dominates every
+/// output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NaturalUnits {
     /// Size of a unit of each input.

@@ -87,7 +87,8 @@ impl LoopShape {
         Self { bandwidth, set_point, peak: PEAK, roll_off, effort: None, pid: None, place }
     }
 
-    /// This shape with another bandwidth, in rad/s; `set_point` and `roll_off` follow if they have their default values.
+    /// This shape with another bandwidth, in rad/s; `set_point` and `roll_off` follow if they have their default
+    /// values.
     #[must_use]
     pub fn at_bandwidth(&self, bandwidth: f64) -> Self {
         let usual = Self::with_bandwidth(self.bandwidth, self.place.clone());

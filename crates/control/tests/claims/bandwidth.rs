@@ -92,8 +92,8 @@ fn natural_units_follow_the_units_of_outputs() {
     assert!((energy - 1.0).abs() < 2e-3, "{energy}");
 }
 
-/// With `x_i`' = `a_i` `x_i` + `b_i` `u_i` the energies are (`c_ji` `b_i`)^2 / (2 (rate - `a_i`)): here 1e-18 / 6 and 0.25 / 8
-/// in the first row, 0.04e-18 / 6 and 1 / 8 in the second, but for the units of the outputs.
+/// With `x_i`' = `a_i` `x_i` + `b_i` `u_i` the energies are (`c_ji` `b_i`)^2 / (2 (rate - `a_i`)): here 1e-18 / 6 and
+/// 0.25 / 8 in the first row, 0.04e-18 / 6 and 1 / 8 in the second, but for the units of the outputs.
 #[test]
 fn natural_units_follow_units_of_any_size() {
     let (c, unit) = ([[1.0, 0.5], [0.2, 1.0]], [1e-9, 1e9]);

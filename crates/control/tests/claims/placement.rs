@@ -307,8 +307,8 @@ fn fifty_eigenvalues_of_a_chain_of_masses_are_moved_to_the_left() {
 }
 
 /// The eigenvalues of a companion matrix are the roots of a polynomial whose coefficients, multiples of 2^-52, are
-/// known without error: to first order a root differs from p by -P(p) / P'(p). Eigenvalues in double precision differ by
-/// three times as much.
+/// known without error: to first order a root differs from p by -P(p) / P'(p). Eigenvalues in double precision differ
+/// by three times as much.
 #[test]
 #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "exact integers")]
 fn an_eigenvalue_error_that_rounding_leaves_is_stated() {

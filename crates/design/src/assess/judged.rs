@@ -9,8 +9,8 @@ use crate::solve::solution::Solution;
 use plant_file::robustness::RobustnessLimits;
 use plant_file::signals::Signal;
 
-/// A loop that is unstable within the tolerances is better than another one if it stays stable for a multiple of them that
-/// is larger by this factor.
+/// A loop that is unstable within the tolerances is better than another one if it stays stable for a multiple of them
+/// that is larger by this factor.
 const FARTHER: f64 = 1.1;
 
 /// Whether there are several signals, all without a unit, so that the units of the file count as equal.
@@ -60,9 +60,9 @@ impl Judged {
         !self.is_unstable && self.largest_peak() <= limits.amber
     }
 
-    /// Whether this loop is better than `other`, by the first criterion in which they differ: a peak of S that is not red;
-    /// the peak of the choice within the limit; stability within the tolerances; the larger multiple of them for which an
-    /// unstable loop is stable; the lower peak above the limit.
+    /// Whether this loop is better than `other`, by the first criterion in which they differ: a peak of S that is not
+    /// red; the peak of the choice within the limit; stability within the tolerances; the larger multiple of them for
+    /// which an unstable loop is stable; the lower peak above the limit.
     pub(crate) fn is_better(&self, other: &Self, limits: &RobustnessLimits) -> bool {
         let rank = |judged: &Self| {
             let is_high = judged.peak_of_choice(limits) > limits.amber;

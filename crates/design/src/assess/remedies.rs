@@ -38,9 +38,9 @@ const LOWER: f64 = 0.8;
 /// Returns a remedy for a loop that is not stable, or for each peak of S above its limit and for instability within the
 /// tolerances.
 ///
-/// These are the units of signals that have none; slower or faster loops; and the shape of the loop, where no speed makes
-/// the verdict green. Other loops are not tried for gains by linear matrix inequalities, for controllers of low order, for
-/// requirements that are not scaled, for several plants or a large one, and without time.
+/// These are the units of signals that have none; slower or faster loops; and the shape of the loop, where no speed
+/// makes the verdict green. Other loops are not tried for gains by linear matrix inequalities, for controllers of low
+/// order, for requirements that are not scaled, for several plants or a large one, and without time.
 pub(crate) fn remedies(
     file: &PlantFile<'_>,
     nominal: &Solution,
@@ -396,10 +396,10 @@ impl Trial {
 }
 
 impl Reason {
-    /// Returns the smallest change that removes all reasons, else the smallest one that removes this reason, if possible
-    /// with all peaks, else for a peak the change with the lowest peak, else a sentence that there is none. Changes that
-    /// make something else worse are left out. None if no change removes this reason and the time was over before all
-    /// were tried.
+    /// Returns the smallest change that removes all reasons, else the smallest one that removes this reason, if
+    /// possible with all peaks, else for a peak the change with the lowest peak, else a sentence that there is none.
+    /// Changes that make something else worse are left out. None if no change removes this reason and the time was
+    /// over before all were tried.
     fn remedy(
         self,
         trials: &[Trial],
