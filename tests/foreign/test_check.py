@@ -311,6 +311,17 @@ def test_a_missing_function_is_reported_for_the_tools_that_need_it(aso_ftc, pyth
     assert loads_in_libcosim(python, path) == (LIBRARY not in tools)
 
 
+@pytest.mark.parametrize("display, tools", [("deg", {FMPY}), ("kN", {FMPY, LIBRARY})])
+def test_a_display_unit_that_its_unit_does_not_list_is_reported_for_the_tools_that_refuse_it(
+    aso_ftc, python, fmu, files, display, tools
+):
+    xml = files["modelDescription.xml"].decode()
+    path = fmu({"modelDescription.xml": xml.replace('<Real unit="N"', f'<Real unit="N" displayUnit="{display}"')})
+    _, said = answer(aso_ftc, path, "--no-run")
+    assert set(said) == tools, said
+    assert not validated(path) and loads_in_libcosim(python, path) == (LIBRARY not in tools)
+
+
 def test_an_identifier_that_libcosim_and_fmpy_accept_is_reported_for_no_tool(aso_ftc, python, fmu, files):
     xml = files["modelDescription.xml"].decode()
     xml = xml.replace('modelIdentifier="FrictionPendulum"', 'modelIdentifier="1-Pendulum"')

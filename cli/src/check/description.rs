@@ -19,11 +19,13 @@ const fn rule(words: &'static str, why: &'static str, stops: &'static [Tool]) ->
     Rule { words, why, stops }
 }
 
-const RULES: [Rule; 20] = {
-    use Tool::{Fmpy, FmpyValidation};
+const RULES: [Rule; 23] = {
+    use Tool::{FmiLibrary, Fmpy, FmpyValidation};
     let dates = "FMPy's schema refuses some of these dates; others show what is there.";
     let validation = "fmpy.validation.validate_fmu reports it; few importers use the list.";
     let refused = "FMPy's validation refuses it.";
+    let in_variables = "FMPy's validation refuses it in a variable.";
+    let by_both = "FMI Library refuses it; FMPy's validation does so in a variable.";
     let zero = "FMPy's validation refuses it; FMI Library assumes zero.";
     let unstated = "Importers that order FMUs by their dependencies may go wrong.";
     let combinations = "FMPy refuses combinations that are not in the table.";
@@ -33,6 +35,9 @@ const RULES: [Rule; 20] = {
         rule("generationDateAndTime", dates, &[]),
         rule("no C identifier", "Tools that build from the sources make C names of it.", &[]),
         rule("which is not defined", refused, &[FmpyValidation]),
+        rule("which its unit does not list", in_variables, &[FmpyValidation]),
+        rule("which no unit lists", by_both, &[FmpyValidation, FmiLibrary]),
+        rule(", and no unit", in_variables, &[FmpyValidation]),
         rule("needs a start value", zero, &[FmpyValidation]),
         rule("has a start value, which", refused, &[FmpyValidation]),
         // FMPy treats `exact` as the default.
@@ -83,12 +88,17 @@ pub(super) fn check(description: &ModelDescription, warnings: &[Warning]) -> Vec
     }
     for problem in description.problems() {
         let rule = RULES.iter().find(|rule| problem.text.contains(rule.words));
+        // FMPy does not read the display units of types.
+        let of_type = problem.text.starts_with("type ") && problem.text.contains("display unit");
+        let stops = rule.map_or(&[][..], |rule| rule.stops).iter().copied();
+        let stops: Vec<_> =
+            stops.filter(|tool| !of_type || *tool != Tool::FmpyValidation).collect();
         // The standard says "should be".
         let advice = problem.text.starts_with("generationDateAndTime");
         let severity = if advice { Severity::Warning } else { Severity::Error };
         let why = rule.map_or("", |rule| rule.why);
         findings.add(severity, FILE, problem.text, why, problem.section);
-        findings.stopping(rule.map_or(&[], |rule| rule.stops));
+        findings.stopping(&stops);
     }
     notes(description, &mut findings);
     findings.all

@@ -72,16 +72,27 @@ fn check_use(
             format!("{who} has unit {unit:?}, which is not defined")
         });
     }
-    if let Some(display) = &real.display_unit {
-        problems.demand(unit.is_some(), in_types, || {
-            format!("{who} has display unit {display:?} and no unit")
-        });
-        let listed = defined
-            .is_none_or(|unit| unit.display_units.iter().any(|known| known.name == *display));
-        problems.demand(listed, in_types, || {
-            format!("{who} has display unit {display:?}, which its unit does not list")
-        });
+    let Some(display) = &real.display_unit else { return };
+    let description = problems.description;
+    let lists = |unit: &Unit| unit.display_units.iter().any(|known| known.name == *display);
+    // Problems with the display unit of a declared type are stated once, for the type.
+    let inherited = |declared: &SimpleType| {
+        real.declared_type.as_ref() == Some(&declared.name)
+            && declared.kind.as_real().is_some_and(|other| {
+                (&other.unit, &other.display_unit) == (&real.unit, &real.display_unit)
+            })
+    };
+    if unit.is_some() && defined.copied().is_none_or(lists)
+        || description.types.iter().any(inherited)
+    {
+        return;
     }
+    let problem = match unit {
+        None => "and no unit",
+        Some(_) if description.units.iter().any(lists) => "which its unit does not list",
+        Some(_) => "which no unit lists",
+    };
+    problems.add(in_types, format!("{who} has display unit {display:?}, {problem}"));
 }
 
 fn check_type(declared: &SimpleType, problems: &mut Problems<'_>) {

@@ -119,9 +119,15 @@ fn units_and_types_are_checked() {
     only_problem("2.2.3", |description| {
         real_of(description, "u").display_unit = Some("deg".into());
     });
-    only_problem("2.2.3", |description| {
+    let text = only_problem("2.2.3", |description| {
         real_of(description, "x").display_unit = Some("grad".into());
     });
+    assert!(text.contains("no unit lists"), "{text}");
+    let text = only_problem("2.2.3", |description| {
+        description.types[0].kind.as_real_mut().unwrap().display_unit = Some("grad".into());
+        real_of(description, "x").display_unit = Some("grad".into());
+    });
+    assert!(text.contains("type Angle"), "{text}");
     only_problem("2.2.3", |description| description.types[2].name = "u".into());
     only_problem("2.2.3", |description| description.types[2].name = "Text".into());
     only_problem("2.2.3", |description| description.types[4].items.push(("auto".into(), 1)));
