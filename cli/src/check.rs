@@ -111,7 +111,7 @@ pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
 /// first.
 fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let description = &unpacked.description;
-    let mut findings = archive::check(&options.fmu, unpacked.entries(), description)?;
+    let mut findings = archive::check(&options.fmu, unpacked)?;
     let read = |path: &str| std::fs::read(unpacked.folder().join(path));
     findings.extend(binaries::check(&read, unpacked.entries(), description));
     sections::renumber(&mut findings, description.version());

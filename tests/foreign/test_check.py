@@ -362,6 +362,15 @@ def test_a_library_in_the_folder_of_another_system_is_an_error(check, fmu, files
     assert the_one(findings, "binaries", "found a file that is none")["where"] == windows
 
 
+def test_the_folder_of_a_platform_in_another_case_is_an_error(check, fmu, files):
+    name = library(files)
+    platform = name.split("/")[1]
+    other = name.replace(platform, platform.capitalize())
+    status, findings = check(fmu({name: None, other: files[name]}), "--no-run")
+    error = the_one(findings, "binaries", f"expected {platform}, with these upper and lower case letters")
+    assert status == 1 and error["where"] == f"binaries/{platform.capitalize()}"
+
+
 def test_a_library_of_another_name_is_an_error(check, fmu, files):
     name = library(files)
     other = name.replace("FrictionPendulum", "libFrictionPendulum")

@@ -6,7 +6,8 @@ use std::io::BufReader;
 use std::path::Path;
 
 use anyhow::Context as _;
-use fmu_description::{ModelDescription, Version};
+use fmu_description::package::Unpacked;
+use fmu_description::{ModelDescription, Version, terminals};
 use zip::CompressionMethod;
 use zip::read::ZipFile;
 
@@ -31,13 +32,9 @@ const UTF8: u16 = 1 << 11;
 /// importer's folder.
 const LONG: usize = 180;
 
-/// Checks the archive at `path`, which can be unpacked safely and contains `names`. Returns an error if the archive
-/// cannot be read.
-pub(super) fn check(
-    path: &Path,
-    names: &[String],
-    description: &ModelDescription,
-) -> anyhow::Result<Vec<Finding>> {
+/// Checks the archive at `path`, which is unpacked. Returns an error if the archive cannot be read.
+pub(super) fn check(path: &Path, unpacked: &Unpacked) -> anyhow::Result<Vec<Finding>> {
+    let (names, description) = (unpacked.entries(), &unpacked.description);
     let mut findings = Findings::about(Part::Archive);
     if path.extension().is_none_or(|extension| extension != "fmu") {
         let why = "Tools that open files by their extension do not offer it.";
@@ -65,6 +62,12 @@ pub(super) fn check(
     }
     if let Ok(file) = archive.by_name("model.png") {
         picture(file, &mut findings);
+    }
+    for warning in &unpacked.archive_warnings {
+        if let Some(what) = warning.strip_prefix(terminals::PATH) {
+            let what = what.trim_start_matches(": ");
+            findings.add(Error, terminals::PATH, what, "", SECTION);
+        }
     }
     Ok(findings.all)
 }

@@ -78,7 +78,8 @@ pub(crate) fn check(
     for name in folders {
         // FMI 3.0 has platform tuples only.
         let named = |platform: &&Platform| {
-            platform.folder == name && (version != Version::V3 || name.contains('-'))
+            platform.folder.eq_ignore_ascii_case(name)
+                && (version != Version::V3 || name.contains('-'))
         };
         let Some(platform) = PLATFORMS.iter().find(named) else {
             let what = if version == Version::V3 {
@@ -90,6 +91,14 @@ pub(crate) fn check(
             findings.add(Note, format!("binaries/{name}"), what, why, SECTION);
             continue;
         };
+        let folder = platform.folder;
+        if folder != name {
+            let what = format!("expected {folder}, with these upper and lower case letters");
+            let why = "Importers do not find the library where upper and lower case differ.";
+            findings.add(Error, format!("binaries/{name}"), what, why, SECTION);
+            findings.stopping(&[Tool::Platform(folder)]);
+            continue;
+        }
         for (interfaces, identifier) in interfaces(description) {
             let path = format!("binaries/{name}/{identifier}{}", platform.suffix);
             if !names.contains(&path) {

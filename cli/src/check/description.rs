@@ -1,6 +1,6 @@
-//! Checks of `modelDescription.xml`: warnings of the parser, and rules of the standard.
+//! Checks of `modelDescription.xml` and of the terminals: warnings of the parser, and rules of the standard.
 
-use fmu_description::{ModelDescription, Version, Warning};
+use fmu_description::{ModelDescription, Version, Warning, terminals};
 
 use super::finding::Severity::Note;
 use super::finding::{Finding, Findings, Part, Severity, Tool};
@@ -99,6 +99,16 @@ pub(super) fn check(description: &ModelDescription, warnings: &[Warning]) -> Vec
         let why = rule.map_or("", |rule| rule.why);
         findings.add(severity, FILE, problem.text, why, problem.section);
         findings.stopping(&stops);
+    }
+    for terminal in &description.terminals {
+        for member in &terminal.members {
+            if description.variable(&member.variable).is_none() {
+                let (name, variable) = (&terminal.name, &member.variable);
+                let what = format!("terminal {name}: no variable is called {variable:?}");
+                let why = "Importers cannot connect this member.";
+                findings.add(Severity::Error, terminals::PATH, what, why, "2.4.9.2");
+            }
+        }
     }
     notes(description, &mut findings);
     findings.all

@@ -296,6 +296,20 @@ numberOfContinuousStates="0" numberOfEventIndicators="0"></fmiModelDescription>"
     }
 }
 
+/// FMI 3.0.2, section 2.4.9.2: `variableName` is the name of a variable in `ModelVariables`.
+#[test]
+fn a_member_of_a_terminal_that_is_no_variable_is_an_error() {
+    let mut description = ModelDescription::parse(XML_3.replace("<LogCategories/>", "")).unwrap();
+    let xml = br#"<fmiTerminalsAndIcons fmiVersion="3.0"><Terminals><Terminal name="plug">
+<TerminalMemberVariable variableName="u"/><TerminalMemberVariable variableName="v"/>
+</Terminal></Terminals></fmiTerminalsAndIcons>"#;
+    description.terminals = fmu_description::terminals::read(xml).unwrap();
+    let all = description::check(&description, &[]);
+    let members = all.iter().filter(|finding| finding.what.starts_with("terminal"));
+    let members: Vec<_> = members.map(|member| (member.severity, member.what.as_str())).collect();
+    assert_eq!(members, [(Severity::Error, "terminal plug: no variable is called \"v\"")]);
+}
+
 #[test]
 fn a_failed_instantiation_is_one_finding() {
     let description = ModelDescription::parse(XML).unwrap();
