@@ -32,7 +32,7 @@ pub use memory::{Columns, MemorySink, Recorded, Texts, Values};
 pub use output::reserve_standard_output;
 pub use output::{STANDARD_OUTPUT, is_stream};
 pub use parquet::ParquetSink;
-pub use read::Table;
+pub use read::{Table, seconds_since_1970};
 pub use select::{Selection, SelectionError};
 
 /// Name of the first column of every file: time in s.

@@ -7,6 +7,8 @@ mod trajectories;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+pub use lines::seconds_since_1970;
+
 use super::{Column, Envelope, ResultsError, Selection};
 
 /// A result file, written by a [`super::Sink`] or by another program. The time must be in the column

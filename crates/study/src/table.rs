@@ -1,7 +1,7 @@
 //! CSV files of signals, in the layout that FMPy reads and writes.
 //!
 //! The header has the names, quoted or not, with `time` first. Each following row is a point in
-//! time, ascending. A time that occurs twice is a jump.
+//! time, ascending, in s or as a date. A time that occurs twice is a jump.
 
 use std::fs::File;
 use std::io::Read;
@@ -21,7 +21,7 @@ const LONGEST_QUOTATION: usize = 40;
 pub struct Table {
     /// Names of the columns after the first, in their order.
     pub names: Vec<String>,
-    /// The first column: time in s, ascending.
+    /// The first column: time in s, ascending; since 1970 for dates.
     pub times: Arc<[f64]>,
     /// The columns after the time, each with the length of `times`.
     pub columns: Vec<Arc<[f64]>>,
@@ -105,7 +105,10 @@ pub enum TableError {
         actual: usize,
     },
     /// An entry is not a finite number.
-    #[error("line {line}, column {column:?}: expected a finite number, found {actual:?}")]
+    #[error(
+        "line {line}, column {column:?}: expected a finite number{}, found {actual:?}",
+        if column == results::TIME { " or a date of ISO 8601" } else { "" }
+    )]
     Number {
         /// Number of the line.
         line: usize,
@@ -165,10 +168,11 @@ pub fn parse(bytes: &[u8]) -> Result<Table, TableError> {
             let (expected, actual) = (names.len(), record.len());
             return Err(TableError::Width { line: line_of(bytes, &record), expected, actual });
         }
-        for ((field, column), name) in record.iter().zip(&mut columns).zip(&names) {
-            let number = number(field).ok_or_else(|| TableError::Number {
+        for (position, (field, column)) in record.iter().zip(&mut columns).enumerate() {
+            let date = || results::seconds_since_1970(field).filter(|_| position == 0);
+            let number = number(field).or_else(date).ok_or_else(|| TableError::Number {
                 line: line_of(bytes, &record),
-                column: name.clone(),
+                column: names[position].clone(),
                 actual: quotation(field),
             })?;
             column.push(number);

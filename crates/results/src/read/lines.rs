@@ -210,7 +210,8 @@ pub(super) fn visit(
             let cell = &record[*position];
             let is_time = *position == positions[0];
             let parse = |cell: &[u8]| {
-                number(cell, layout.delimiter).or_else(|| date(cell).filter(|_| is_time))
+                let date = || seconds_since_1970(cell).filter(|_| is_time);
+                number(cell, layout.delimiter).or_else(date)
             };
             let parsed = parse(cell).ok_or_else(|| {
                 let text = String::from_utf8_lossy(cell).into_owned();
@@ -282,9 +283,14 @@ fn is_ended(path: &Path) -> bool {
 }
 
 /// Parses a date of ISO 8601, with or without a time of day; returns the time in s since 1970, in UTC unless the
-/// text states another offset.
-fn date(cell: &[u8]) -> Option<f64> {
-    let text = std::str::from_utf8(cell).ok()?.trim().replacen(' ', "T", 1);
+/// text states another offset. `None` for another text.
+///
+/// ```
+/// assert_eq!(results::seconds_since_1970(b"2001-09-09 01:46:40"), Some(1e9));
+/// ```
+#[must_use]
+pub fn seconds_since_1970(date: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(date).ok()?.trim().replacen(' ', "T", 1);
     let utc = DateTime::parse_from_str(&text, "%Y-%m-%dT%H:%M:%S%.f%#z")
         .map(|time| time.to_utc())
         .or_else(|_| text.parse::<NaiveDateTime>().map(|time| time.and_utc()))

@@ -26,6 +26,14 @@ fn a_byte_order_mark_empty_lines_and_a_missing_last_newline_do_no_harm() {
     assert_eq!(*table.times, [0.0, 1.0]);
 }
 
+/// `date -u -d TEXT +%s`.
+#[test]
+fn dates_in_the_column_of_the_time_are_seconds_since_1970() {
+    let text = "time,u\n2023-11-14 22:13:20.250,1\n2023-11-14T23:13:21+01:00,2\n2023-11-15,3\n";
+    let table = parse(text.as_bytes()).unwrap();
+    assert_eq!(*table.times, [1_700_000_000.25, 1_700_000_001.0, 1_700_006_400.0]);
+}
+
 #[test]
 fn numbers_are_read_to_the_last_bit() {
     let table =
@@ -58,7 +66,14 @@ fn an_invalid_table_is_refused_with_its_line() {
         ("time,u\n\n\n0,x\n", "line 4, column \"u\": expected a finite number, found \"x\""),
         ("time,u\n0,\n", "line 2, column \"u\": expected a finite number, found \"\""),
         ("time,u\n0,NaN\n", "line 2, column \"u\": expected a finite number, found \"NaN\""),
-        ("time,u\n-inf,1\n", "line 2, column \"time\": expected a finite number, found \"-inf\""),
+        (
+            "time,u\n-inf,1\n",
+            "line 2, column \"time\": expected a finite number or a date of ISO 8601, found \"-inf\"",
+        ),
+        (
+            "time,u\n0,2001-09-09\n",
+            "line 2, column \"u\": expected a finite number, found \"2001-09-09\"",
+        ),
         ("time,u\n0,1e999\n", "line 2, column \"u\": expected a finite number, found \"1e999\""),
         ("time,u\n0,1 2\n", "line 2, column \"u\": expected a finite number, found \"1 2\""),
         (
