@@ -184,6 +184,26 @@ def test_a_system_structure_without_fmus_is_named(aso_ftc, tmp_path):
     assert done.stderr == f"error: {ssd}: the system has no FMU, expected at least one\n"
 
 
+def test_a_fault_after_the_stop_time_is_a_warning_and_changes_nothing(aso_ftc, packed, tmp_path):
+    system = f"""[fmus]
+plant = "{packed["plant"].as_posix()}"
+controller = "{packed["controller"].as_posix()}"
+[experiment]
+stop-time = 0.05
+"""
+    fault = '[[scenario.fault]]\nconnection = "plant.u"\nbias = { value = 5, from = START }\n'
+    results, warnings = [], []
+    for index, start in enumerate([None, "0.06", "0.04"]):
+        file = tmp_path / f"{index}.toml"
+        file.write_text(system + (fault.replace("START", start) if start else ""))
+        done = aso_ftc("run", file, "--out", tmp_path / str(index))
+        assert done.returncode == 0, done
+        results.append((tmp_path / str(index) / "results.csv").read_bytes())
+        warnings.append("it has no effect" in done.stderr)
+    assert warnings == [False, True, False]
+    assert results[0] == results[1] != results[2]
+
+
 @pytest.mark.parametrize("script", ["web", "book"])
 def test_a_port_in_use_is_one_sentence(root, script):
     with socket.create_server(("127.0.0.1", 0)) as server:

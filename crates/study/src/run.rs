@@ -11,8 +11,10 @@ use fmu_description::Version;
 use fmu_description::similar::slip;
 use fmu_import::crash;
 use master::drive::Drive;
+use master::signal::reached;
 use master::{Port, Scenario, Simulation, Slave, SlowState, System, SystemError};
 use results::{Column, ResultsError, Sink};
+use serde_spanned::Spanned;
 use ssp::Opened;
 
 use crate::assemble::{AssembledSystem, assemble_with};
@@ -190,6 +192,15 @@ fn scenario(
         let place = error.place.clone();
         loaded.point(&place, Error::Scenario(error))
     })?;
+    let faults = prepared.windows.iter();
+    let faults =
+        faults.map(|(input, window)| (format!("the fault of {input} starts"), window.from));
+    let settings = loaded.config.scenario.set.iter().map(Spanned::get_ref);
+    let settings = settings.map(|entry| (format!("{} is set", entry.variable.get_ref()), entry.at));
+    for (what, at) in faults.chain(settings).filter(|(_, at)| !reached(plan.stop, *at)) {
+        let stop = plan.stop;
+        tracing::warn!("{what} at {at} s, after the stop time {stop} s: it has no effect");
+    }
     let driven: Vec<Port> = prepared.scenario.drives.iter().map(Drive::port).collect();
     let free = system.free_inputs().into_iter().filter(|port| !driven.contains(port));
     let free: Vec<String> = free.map(|port| system.name(port)).collect();

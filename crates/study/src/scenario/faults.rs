@@ -38,12 +38,13 @@ impl<'a> Resolver<'a> {
                 inputs.len() - 1
             });
             let chain = &mut inputs[position].1;
-            let index = chain.len() as u64;
+            let (name, index) = (target.name.clone(), chain.len() as u64);
             let converter = EntryConverter { target, start: self.setup.start, index };
             let fault = converter.fault(entry.get_ref());
             let (window, fault) = fault.map_err(at(entry, &path))?;
             let added = chain.push(window, fault, self.setup.step);
             added.map_err(|error| at(entry, &path)(error.into()))?;
+            self.windows.push((name, window));
         }
         let mut chains = Vec::new();
         for (port, chain) in inputs {

@@ -13,6 +13,7 @@ use serde_spanned::Spanned;
 use super::{Literal, Reason, Scenario, ScenarioError};
 use crate::table::{self, Table};
 use master::drive::{Drive, DriveKind, DriveSource, Drives};
+use master::fault::Window;
 use master::{Port, System};
 
 /// Settings of the run that a scenario needs.
@@ -36,6 +37,8 @@ pub struct ResolvedScenario {
     /// Columns of `[[scenario.table]]` that drive nothing, with their file: no variable that can be driven has their
     /// name, or another entry drives it.
     pub unused: Vec<(PathBuf, String)>,
+    /// The faults in the order of the file: the input and the time of each.
+    pub windows: Vec<(String, Window)>,
 }
 
 impl Scenario {
@@ -55,6 +58,7 @@ impl Scenario {
             files: HashMap::new(),
             drives: Vec::new(),
             unused: Vec::new(),
+            windows: Vec::new(),
         };
         resolver.settings(&self.set)?;
         for (index, entry) in self.signal.iter().enumerate() {
@@ -69,7 +73,7 @@ impl Scenario {
         let faults = resolver.faults(&self.fault)?;
         let drives = Drives::new(resolver.drives.into_iter().map(|(drive, _)| drive).collect());
         let scenario = master::Scenario { drives, faults };
-        Ok(ResolvedScenario { scenario, unused: resolver.unused })
+        Ok(ResolvedScenario { scenario, unused: resolver.unused, windows: resolver.windows })
     }
 }
 
@@ -87,6 +91,7 @@ pub(super) struct Resolver<'a> {
     /// The drives, each with the path of its entry.
     pub(super) drives: Vec<(Drive, String)>,
     pub(super) unused: Vec<(PathBuf, String)>,
+    pub(super) windows: Vec<(String, Window)>,
 }
 
 /// A variable with its description.
