@@ -345,7 +345,12 @@ impl ActiveRun {
             }
             RunEnd::Failed(error) => {
                 let error = explained(error);
-                message = format!("the run ended early, after t = {shown} s: {error}");
+                let end = if self.run.simulation.is_finished() {
+                    format!("the run made all steps, up to t = {shown} s, and failed at its end")
+                } else {
+                    format!("the run ended early, after t = {shown} s")
+                };
+                message = format!("{end}: {error}");
                 tracing::error!("{message}");
                 1
             }

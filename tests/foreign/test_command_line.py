@@ -4,6 +4,7 @@ installed away from its clone."""
 import os
 import pty
 import re
+import resource
 import shutil
 import socket
 import subprocess
@@ -202,6 +203,17 @@ stop-time = 0.05
         warnings.append("it has no effect" in done.stderr)
     assert warnings == [False, True, False]
     assert results[0] == results[1] != results[2]
+
+
+def test_a_run_whose_last_write_fails_made_all_steps(aso_ftc, packed, tmp_path):
+    shutil.unpack_archive(packed["plant"], tmp_path / "plant", "zip")
+    words = ["run", tmp_path / "plant", "--stop-time", "0.05", "--out", tmp_path / "out"]
+    # The rows, more than 4000 bytes, are written at the end.
+    done = aso_ftc(*words, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000)))
+    results = tmp_path / "out" / "results.csv"
+    assert done.returncode == 1 and done.stderr.startswith(
+        f"error: the run made all steps, up to t = 0.05 s, and failed at its end: cannot write {results}: "
+    ), done
 
 
 @pytest.mark.parametrize("script", ["web", "book"])
