@@ -230,7 +230,7 @@ fn with_shown_path(error: PackageError, target: &Target) -> SspError {
     error.into()
 }
 
-/// Lists up to ten SSD files at the root of an unpacked SSP.
+/// Lists up to ten SSD files at the root of an unpacked SSP; without any, names the default SSD in a folder there.
 fn definitions_in(folder: &Path) -> String {
     let names = fs::read_dir(folder).into_iter().flatten().flatten();
     let is_ssd = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "ssd");
@@ -238,5 +238,14 @@ fn definitions_in(folder: &Path) -> String {
     let mut names: Vec<String> = names.map(|name| name.display().to_string()).collect();
     names.sort();
     names.truncate(10);
-    if names.is_empty() { "no SSD".to_owned() } else { names.join(", ") }
+    if !names.is_empty() {
+        return names.join(", ");
+    }
+    let inner = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut inner = inner.map(|entry| Path::new(&entry.file_name()).join(DEFAULT));
+    let inner = inner.find(|path| folder.join(path).is_file());
+    inner.map_or_else(
+        || "no SSD".to_owned(),
+        |path| format!("{}, which is in a folder", path.display()),
+    )
 }

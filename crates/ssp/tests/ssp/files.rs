@@ -72,6 +72,14 @@ fn an_ssp_is_opened_with_its_default_or_another_variant() {
 }
 
 #[test]
+fn an_archive_of_the_folder_of_an_ssp_is_refused_with_the_folder() {
+    let bench = Bench::new();
+    let path = archive(&bench.path("a.ssp"), &[("a/SystemStructure.ssd", b"<a/>".into())]);
+    let text = open(&path).unwrap_err().to_string();
+    assert!(text.ends_with(" found a/SystemStructure.ssd, which is in a folder"), "{text}");
+}
+
+#[test]
 fn systems_of_other_files_become_part_of_the_system_with_the_components_bindings_last() {
     let bench = Bench::new();
     fmus(&bench);
