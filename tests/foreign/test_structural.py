@@ -149,3 +149,19 @@ def test_an_extent_out_of_range_or_outside_of_configuration_mode_is_refused(fmus
     for value in ("0", "101"):
         done = aso_ftc(*run, "--set", f"s.n={value}")
         assert done.returncode == 2 and "s.n" in done.stderr, done.stderr
+
+
+def test_a_connection_of_a_whole_array_replaces_those_of_its_elements_in_the_file(fmus, aso_ftc, tmp_path):
+    system = "[fmus]\n" + "".join(f'{name} = "{fmus[3].as_posix()}"\n' for name in "abc")
+
+    def run(ends, *more):
+        file = tmp_path / "system.toml"
+        file.write_text(system + "[[connections]]\nfrom = '{}'\nto = '{}'\n".format(*ends))
+        done = aso_ftc("run", file, *more, "--stop-time", "1", "--set", "c.x=5 0", "--out", tmp_path / "out")
+        return done, done.returncode == 0 and (tmp_path / "out" / "results.csv").read_bytes()
+
+    _, whole = run(("a.y", "b.u"))
+    done, replaced = run(("c.y[1]", "b.u[1]"), "--connect", "a.y=b.u")
+    assert whole and whole == replaced, done
+    done, _ = run(("a.y", "b.u"), "--connect", "c.y[1]=b.u[1]")
+    assert done.returncode == 2 and "the file connects all of b.u" in done.stderr, done

@@ -330,6 +330,11 @@ pub(crate) fn split_names(lists: &[String]) -> Vec<String> {
     names.into_iter().map(str::to_owned).collect()
 }
 
+/// Whether `name` is an element of the array `whole`, such as `b.u[1]` of `b.u`.
+fn is_element(name: &str, whole: &str) -> bool {
+    name.strip_prefix(whole).is_some_and(|index| index.starts_with('['))
+}
+
 /// Splits `from=to`; the error for another sign between the names proposes the right form.
 fn connection(text: &str) -> Result<(String, String), String> {
     let split =
@@ -480,13 +485,25 @@ impl Options {
         }
         for (position, (from, to)) in self.system.connections.iter().enumerate() {
             let earlier = &self.system.connections[..position];
-            if let Some((first, _)) = earlier.iter().find(|(_, known)| known == to) {
+            let overlaps =
+                |known: &str| known == to || is_element(known, to) || is_element(to, known);
+            if let Some((first, _)) = earlier.iter().find(|(_, known)| overlaps(known)) {
                 bail!(
                     "{to} has two sources, {first} and {from}, expected one --connect for an input"
                 );
             }
             let connections = config.connections.get_or_insert_default();
-            connections.retain(|entry| entry.get_ref().to.get_ref() != to);
+            connections.retain(|entry| {
+                let known = entry.get_ref().to.get_ref();
+                known != to && !is_element(known, to)
+            });
+            let mut inputs = connections.iter().map(|entry| entry.get_ref().to.get_ref());
+            if let Some(whole) = inputs.find(|known| is_element(to, known)) {
+                bail!(
+                    "--connect {from}={to}: the file connects all of {whole}, expected the same here, or a connection \
+                     of each element in the file"
+                );
+            }
             connections.push(ConnectionEntry::new(from.clone(), to.clone()));
         }
         for (name, value) in &self.system.settings {
