@@ -190,6 +190,15 @@ def test_texts_and_values_that_are_not_finite_are_named(aso_ftc, write):
     np.testing.assert_array_equal(curves(page)["x"]["values"], results["x"])
 
 
+def test_integers_that_doubles_cannot_hold_are_named(aso_ftc, write):
+    results = pd.DataFrame({"time": [0.0, 1.0], "large": [2**53 + 1, 2**53 + 3], "small": [2**53 - 1, 0], "r": [1e300, 2.0]})
+    assert float(results["large"][0]) != results["large"][0] and float(results["small"][0]) == results["small"][0]
+    for name in ("own.csv", "own.parquet"):
+        page, _ = report(aso_ftc, write(name, results))
+        (warning,) = page.xpath("//main//p[@class='outcome warned']")
+        assert warning.text_content().endswith("not seen: large."), warning.text_content()
+
+
 def test_numbers_have_six_digits_and_zero_no_sign(aso_ftc, write):
     constants = {-0.0: "0", 1.23456789: "1.23457", -999999.7: "-1e6", 5e-324: "5e-324", 1.7976931348623157e308: "1.79769e308"}
     results = pd.DataFrame({"time": [0.0, 1.0], **{f"c{k}": [value, value] for k, value in enumerate(constants)}})

@@ -1,7 +1,9 @@
 //! Axes: the map from values to page coordinates, and the ticks at round values.
 
-/// Ends of axes of a larger magnitude are clipped to this value, so that sums of two values stay finite.
-const HUGE: f64 = 1e300;
+/// Ends of axes of a larger magnitude are clipped to this value, so that ticks just beyond them stay finite.
+const HUGE: f64 = 1.797e308;
+/// Ends of symmetric axes are clipped to this value, so that quotients by their knee stay finite.
+const HUGE_SYMMETRIC: f64 = 1e300;
 
 /// The scale of an axis.
 #[derive(Debug, Clone, Copy)]
@@ -58,14 +60,15 @@ impl Axis {
         } else {
             1.0
         };
-        let (low, high) = (low - widening, high + widening);
+        let (low, high) = ((low - widening).max(-HUGE), (high + widening).min(HUGE));
         Self { scale: Scale::Linear, low, high, pixels, ticks }
     }
 
     /// Creates an axis over `ends`: linear between minus and plus `knee`, which is above 0, logarithmic beyond.
     #[must_use]
     pub fn symmetric(ends: (f64, f64), knee: f64, pixels: (f64, f64), ticks: u8) -> Self {
-        Self { scale: Scale::Symmetric(knee), ..Self::exact(ends.0, ends.1, pixels, ticks) }
+        let [low, high] = [ends.0, ends.1].map(|end| end.clamp(-HUGE_SYMMETRIC, HUGE_SYMMETRIC));
+        Self { scale: Scale::Symmetric(knee), ..Self::exact(low, high, pixels, ticks) }
     }
 
     /// Creates a linear axis with a margin around `values`, clipped to magnitudes up to `cap`. Ignores NaN; without
@@ -84,8 +87,20 @@ impl Axis {
             (low.min(value), high.max(value))
         });
         let tight = Self::longer_than(1e-9, (low, high), pixels, ticks);
-        let margin = 0.06 * (tight.high - tight.low);
-        Self { low: tight.low - margin, high: tight.high + margin, ..tight }
+        let margin = 0.06 * tight.shrunk_length() / tight.shrinkage();
+        let (low, high) = (tight.low - margin, tight.high + margin);
+        Self { low: low.max(-HUGE), high: high.min(HUGE), ..tight }
+    }
+
+    /// Returns the factor by which lengths are shrunk so that they stay finite; 1 unless the ends are huge.
+    fn shrinkage(&self) -> f64 {
+        if self.low.abs().max(self.high.abs()) > HUGE_SYMMETRIC { 0.25 } else { 1.0 }
+    }
+
+    /// Returns the length of a linear axis times [`Self::shrinkage`].
+    fn shrunk_length(&self) -> f64 {
+        let factor = self.shrinkage();
+        factor * self.high - factor * self.low
     }
 
     /// Returns the range of the values.
@@ -109,7 +124,9 @@ impl Axis {
     /// Returns the page coordinate of a value, clipped to at most one axis length beyond the axis; NaN for NaN.
     #[must_use]
     pub fn place(&self, value: f64) -> f64 {
-        let [low, high, value] = [self.low, self.high, value].map(|end| self.scale.to_linear(end));
+        let factor = self.shrinkage();
+        let linear = |end| factor * self.scale.to_linear(end);
+        let [low, high, value] = [self.low, self.high, value].map(linear);
         let share = (value - low) / (high - low);
         let (first, last) = self.pixels;
         first + share.clamp(-1.0, 2.0) * (last - first)
@@ -143,12 +160,13 @@ impl Axis {
 
     /// Returns the ticks at multiples of 1, 2 or 5 times a power of ten.
     fn multiples(&self) -> Vec<(f64, String)> {
-        let span = self.high - self.low;
-        let step = round_step(span / f64::from(self.ticks));
-        let first = ((self.low - 1e-9 * span) / step).ceil();
+        let (span, factor) = (self.shrunk_length(), self.shrinkage());
+        let step = round_step(span / f64::from(self.ticks) / factor);
+        let tolerance = 1e-9 * span / factor;
+        let first = ((self.low - tolerance) / step).ceil();
         std::iter::successors(Some(first), |count| Some(count + 1.0))
             .map(|count| count * step)
-            .take_while(|value| *value <= self.high + 1e-9 * span)
+            .take_while(|value| *value <= self.high + tolerance)
             .take(2 * usize::from(self.ticks))
             .map(|value| (value, label(value, step, self.low.abs().max(self.high.abs()))))
             .collect()
@@ -220,6 +238,8 @@ mod tests {
             (59.99, 66.01),
             (-1.06e-3, 1.1e-3),
             (-1e300, 1e300),
+            (-1.7e308, 1.7e308),
+            (1.5e308, f64::MAX),
             (3.0, 3.0),
             (0.0, 0.0),
             (1e5, 1e5 + 1.0),
@@ -257,6 +277,17 @@ mod tests {
         assert_eq!(Axis::exact(start, end, (0.0, 1.0), 5).range(), (start, end));
         let (low, high) = Axis::around([start, end].into_iter(), None, (0.0, 1.0), 5).range();
         assert!(low < 1.6e9 && high > 1.8e9, "{low} {high}");
+    }
+
+    #[test]
+    fn an_axis_around_the_largest_numbers_has_them_inside() {
+        for (low, high) in [(-1.7e308, 1.7e308), (-1e-3, 1.79e308), (1.79e308, 1.79e308)] {
+            let axis = Axis::around([low, high].into_iter(), None, (0.0, 100.0), 5);
+            let places = [low, high].map(|value| axis.place(value));
+            assert!(axis.contains(low) && axis.contains(high), "{low} to {high}");
+            assert!(places[0] <= places[1] && (0.0..=100.0).contains(&places[0]), "{places:?}");
+            assert!(low == high || places[1] - places[0] > 80.0, "{places:?}");
+        }
     }
 
     fn texts(axis: &Axis) -> Vec<String> {

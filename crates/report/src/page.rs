@@ -6,7 +6,7 @@ use figure::interactive::{
     BASE_STYLE, COLOURS, FOLD, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE, USAGE,
 };
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use results::Column;
+use results::{Column, ColumnKind};
 
 use serde::Serialize;
 
@@ -101,6 +101,7 @@ pub(crate) fn render(content: &Content<'_>, plots: &Plots) -> String {
                         @if content.left_out > 0 {
                             p { (content.left_out) " more variables of the file are not shown; " code { "--variables" } " chooses others." }
                         }
+                        (rounded(content))
                         @if !content.texts.is_empty() { p { "Texts are not shown: " (listed(content.texts, LISTED)) "." } }
                         details.said.stays {
                             summary { "How to zoom, read values and differences, by mouse, keyboard and touch" }
@@ -268,6 +269,24 @@ fn unchanged(content: &Content<'_>) -> Markup {
                         }
                     }
                 }
+            }
+        }
+    }
+}
+
+/// Names the integers with values that a double cannot distinguish from their neighbours.
+fn rounded(content: &Content<'_>) -> Markup {
+    let is_rounded = |(column, of): &(&Column, &Statistics)| {
+        let size = of.smallest.0.abs().max(of.largest.0.abs());
+        matches!(column.kind, ColumnKind::Integer | ColumnKind::Long) && size >= 2_f64.powi(53)
+    };
+    let names = content.columns.iter().zip(content.statistics).filter(is_rounded);
+    let names: Vec<_> = names.map(|(column, _)| column.name.clone()).collect();
+    html! {
+        @if !names.is_empty() {
+            p.outcome.warned {
+                "Integers beyond 2" sup { "53" } " = 9007199254740992 are rounded, and differences below the rounding are not seen: "
+                (listed(&names, LISTED)) "."
             }
         }
     }
