@@ -26,7 +26,7 @@ const HEADERS: [(&str, &str); 6] = [
 /// The folders that are copied from an FMU to the FMU that is built from it.
 const PARTS: [&str; 4] = ["binaries", "resources", "terminalsAndIcons", "extra"];
 /// Version of the build procedure, a part of the cache key. Change it whenever the procedure changes.
-const RECIPE: u32 = 5;
+const RECIPE: u32 = 6;
 /// Largest number of characters of compiler output that an error quotes.
 const OUTPUT: usize = 4000;
 
@@ -318,15 +318,58 @@ impl<'a> Build<'a> {
         let linker =
             self.cpp.as_ref().filter(|_| configuration.sets.iter().any(SourceFileSet::has_cpp));
         let library = folder.path().join(format!("library{}", std::env::consts::DLL_SUFFIX));
-        let mut command = linker.unwrap_or(&self.c).command();
-        command.arg("-shared").arg("-o").arg(&library).args(&objects);
         let (binaries, platforms) =
             (self.sources.with_file_name("binaries"), platforms_of(self.version));
-        let libraries = configuration.libraries.iter();
-        command.args(libraries.map(|name| library_argument(&binaries, platforms, name)));
-        command.arg("-lm");
-        self.run(&mut command, "linking")?;
+        let link = |options: &[&str]| {
+            let mut command = linker.unwrap_or(&self.c).command();
+            command.arg("-shared").args(options).arg("-o").arg(&library).args(&objects);
+            let libraries = configuration.libraries.iter();
+            command.args(libraries.map(|name| library_argument(&binaries, platforms, name)));
+            command.arg("-lm");
+            self.run(&mut command, "linking")
+        };
+        if let Err(mut error) = link(&["-Wl,--no-undefined"]) {
+            let unlisted = self.unlisted(configuration, &error.to_string()).join(", ");
+            if let CompileError::Failed { output, .. } = &mut error
+                && !unlisted.is_empty()
+            {
+                *output = format!(
+                    "{output}; the list of source files does not name {unlisted}, which is in sources and may have \
+                     these functions"
+                );
+                return Err(error);
+            }
+            // Another library in the process may define the functions.
+            link(&[])?;
+        }
         fs::read(&library).map_err(file_error("read", &library))
+    }
+
+    /// Returns the names of C and C++ files at the top of `sources` that the configuration does not list, that no
+    /// other file there includes, and that contain one of the functions that a linker's `message` calls undefined.
+    fn unlisted(&self, configuration: &BuildConfiguration, message: &str) -> Vec<String> {
+        let lines = message.lines().filter(|line| line.contains("undefined"));
+        let functions =
+            lines.filter_map(|line| line.trim_end_matches('\'').rsplit(['`', ' ']).next());
+        let functions: Vec<&str> = functions.filter(|function| !function.is_empty()).collect();
+        let files = configuration.sets.iter().flat_map(|set| &set.files);
+        let listed: Vec<PathBuf> = files.map(|file| source_file(&self.sources, file)).collect();
+        let entries = fs::read_dir(&self.sources).into_iter().flatten().flatten();
+        let read = |path: PathBuf| {
+            let text = String::from_utf8_lossy(&fs::read(&path).ok()?).into_owned();
+            Some((path.file_name()?.to_string_lossy().into_owned(), listed.contains(&path), text))
+        };
+        let texts: Vec<_> = entries.filter_map(|entry| read(entry.path())).collect();
+        let is_unlisted = |(name, listed, text): &&(String, bool, String)| {
+            [".c", ".cc", ".cpp", ".cxx"].iter().any(|extension| name.ends_with(extension))
+                && !listed
+                && functions.iter().any(|function| text.contains(function))
+                && !texts.iter().any(|(_, _, other)| other.contains(&format!("{name}\"")))
+        };
+        let mut names: Vec<String> =
+            texts.iter().filter(is_unlisted).map(|(name, ..)| name.clone()).collect();
+        names.sort();
+        names
     }
 
     /// Compiles a source file.

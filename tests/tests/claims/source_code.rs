@@ -165,3 +165,24 @@ fn a_missing_compiler_and_wrong_code_are_named() {
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));
     assert!(said(&output).contains("failed: signal: 9"), "{}", said(&output));
 }
+
+#[test]
+fn a_source_file_that_the_list_lacks_is_named_with_its_functions() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = CFmu::well_behaved().in_source().write(folder.path(), "slave");
+    let unpacked = Unpacked::open_whole(&path).unwrap();
+    let xml = std::fs::read_to_string(unpacked.folder().join("modelDescription.xml")).unwrap();
+    let shorter = xml.replace("<File name=\"deeds.c\"/>", "");
+    assert_ne!(shorter, xml);
+    let mut package = Package::new(shorter);
+    package.add_folder("sources", &unpacked.folder().join("sources")).unwrap();
+    package.write(&path).unwrap();
+    let output = run(folder.path(), "cc", &[&RUN[..], &["--compile"]].concat());
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("undefined reference to"), "{}", said(&output));
+    assert!(
+        said(&output).contains("does not name deeds.c, which is in sources"),
+        "{}",
+        said(&output)
+    );
+}
