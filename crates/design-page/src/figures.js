@@ -123,7 +123,7 @@
     return element;
   });
 
-  redrawOn((forPaper) => {
+  redrawOn(Object.values(axes), (forPaper) => {
     isPaper = forPaper;
     const before = [...drawn.keys()];
     for (const element of before) erase(element);

@@ -463,13 +463,15 @@ function drawMarks({ ctx, bbox, valToPos }, marks, scale) {
   ctx.restore();
 }
 
-/* Draws again when colours or pixels change: another scheme of the system, another zoom of the browser, or paper,
-   which is light. */
-function redrawOn(draw) {
+/* Draws the plots of some axes again when colours or pixels change: another scheme of the system, another zoom of the
+   browser, or paper, which is light. */
+function redrawOn(axes, draw) {
   const { classList } = document.documentElement;
   const paper = (isPaper) => {
     classList.toggle("printing", isPaper);
     draw(isPaper);
+    /* uPlot draws in a microtask, and Firefox prints before it. */
+    for (const { plots } of axes) for (const plot of plots) plot.batch(() => undefined);
   };
   const again = () => draw(classList.contains("printing"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);

@@ -204,7 +204,7 @@
     const sought = field("filter").value.toLowerCase();
     for (const label of field("signals").querySelectorAll("label")) label.hidden = !label.dataset.name.includes(sought);
   });
-  redrawOn(draw);
+  redrawOn([horizontal], draw);
 
   // --- the state
 

@@ -282,7 +282,7 @@
       drawAll();
     });
   }
-  redrawOn((forPaper) => {
+  redrawOn([axis], (forPaper) => {
     isPaper = forPaper;
     for (const figure of figures) {
       erase(figure);
