@@ -492,6 +492,12 @@ def test_the_controls_zoom_all_plots_and_show_the_difference(aso_ftc, write, tmp
         page.until(f"curves() === {readings[1]} - 3")
         page.evaluate("id('all').click()")
         readings += [page.evaluate("curves()"), page.evaluate("range()")]
+        # Firefox keeps a choice when the page is loaded again.
+        text = (tmp_path / "own.html").read_text(encoding="utf-8").replace('value="both" checked', 'value="both"')
+        (tmp_path / "own.html").write_text(text.replace('value="difference"', 'value="difference" checked'), encoding="utf-8")
+        page.open((tmp_path / "own.html").as_uri())
+        page.until(DRAWN)
+        assert page.evaluate("document.querySelectorAll('.u-legend .u-series').length") == readings[-2]
     whole, both, closer, later, typed, compared, differences, end = readings
     assert (whole, closer, later, typed, compared, end) == ([0, 4], [1, 3], [2, 4], [1, 2], [1, 2], [0, 4])
     # Each plot has a line for the time, and one for each curve.

@@ -13,7 +13,7 @@
   const COLOURS = { change: "--link", fault: "--bad", intervention: "--good", message: "--warn" };
   const figures = []; /* those that the page has so far */
   const drawn = new Map(); /* by figure: its plot */
-  let shown = "both";
+  let shown = document.querySelector("[name=shown]:checked")?.value ?? "both"; /* Firefox keeps a choice when a page is loaded again */
   let isPaper = false;
 
   /* The bytes of a text in base64. */
