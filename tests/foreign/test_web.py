@@ -662,6 +662,17 @@ def test_small_values_and_seconds_since_1970_of_a_file_have_their_digits(open_pa
     assert float(page.evaluate(f"{frame}.then(() => document.querySelector('#dropped .u-value').textContent)")) in times[1:]
 
 
+def test_labels_of_a_narrow_range_of_a_run_differ(open_page):
+    page = open_page("#stop=6")
+    run_to_the_end(page)
+    page.evaluate("document.getElementById('force').scrollIntoView({block: 'center'})")
+    drawn = labels(page)
+    for _ in range(3):
+        page.evaluate("document.getElementById('force').dispatchEvent(new KeyboardEvent('keydown', {key: '+'}))")
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert any(label != round(label, 3) for label in drawn()), "the friction of a cart that sticks is -30.000 N"
+
+
 def test_an_infinite_value_of_a_file_is_a_gap_and_the_axis_is_that_of_the_others(open_page):
     page = open_page()
     drawn = labels(page)

@@ -4,16 +4,6 @@ const MOST_AT_FIRST = 6; // plots
 let reader = null; // the worker
 let shown = null; // {axis, plots, times, redraw}
 
-// Numbers with all of their digits, such as seconds since 1970 and currents in A; uPlot's own labels have three decimals, and
-// its places for those of an axis of time are 50 px wide.
-const write = (value) => (value === null || value === undefined ? "" : `${Number(value.toPrecision(15))}`);
-const labels = (self, places) => places.map(write);
-const AXES = {
-  x: { values: labels, space: (self, index, low, high) => Math.max(50, 28 + 7 * write(Math.trunc(Math.max(-low, high))).length) },
-  y: { values: labels, size: (self, texts) => Math.max(52, 17 + 7 * Math.max(0, ...(texts ?? []).map((text) => text.length))) },
-  write: (value) => write(value) || "–",
-};
-
 // Asks the worker; `progress` gets parts from 0 to 1.
 function ask(message, progress = () => {}) {
   return new Promise((done, failed) => {
@@ -61,7 +51,7 @@ export async function showFile(file, place, status) {
   function draw(name) {
     const entry = plots.get(name);
     const label = units[name] ? `${name} in ${units[name]}` : name;
-    entry.plot = new TimePlot(axis, entry.element, times, [{ label, ink: "--ink-1", column: entry.column }], AXES);
+    entry.plot = new TimePlot(axis, entry.element, times, [{ label, ink: "--ink-1", column: entry.column }]);
   }
 
   function redraw() {

@@ -105,12 +105,16 @@ function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
-const digits = (value) => (value === null || value === undefined ? "–" : Number(value.toPrecision(6)).toString());
+const digits = (value, count = 6) => (value === null || value === undefined ? "–" : `${Number(value.toPrecision(count))}`);
+// All digits, as of seconds since 1970 and of a narrow range; uPlot's own labels have three decimals, and its places for
+// those of an axis of time are 50 px wide.
+const exact = (value) => digits(value, 15);
+const labels = (self, places) => places.map((place) => (place === null ? "" : exact(place)));
 
 // A plot over time. `curves`: {label, ink, column, scale, dash}; `band`: a range to shade; `marks`: a function that
-// returns times to mark; `wide`: the vertical axis is wide near 0; `x`, `y`: more about the axes; `write`: the text of a time.
+// returns times to mark; `wide`: the vertical axis is wide near 0.
 class TimePlot {
-  constructor(axis, place, times, curves, { unit = "", height = 200, band = null, marks = () => [], wide = false, x = {}, y = {}, write = digits } = {}) {
+  constructor(axis, place, times, curves, { unit = "", height = 200, band = null, marks = () => [], wide = false } = {}) {
     Object.assign(this, { axis, place, times, curves, height });
     const style = { stroke: colour("--text"), grid: { stroke: colour("--grid") }, ticks: { stroke: colour("--grid") } };
     const decades = (self, index, low, high) => [-1000, -100, -10, -1, 0, 1, 10, 100, 1000].filter((value) => value >= low && value <= high);
@@ -133,9 +137,15 @@ class TimePlot {
       height,
       plugins: [{ hooks: { drawClear: shade, drawAxes: mark } }],
       scales: { x: { time: false }, y: wide ? { distr: 4, asinh: 1, range: (self, low, high) => [Math.min(low ?? 0, -2) * 1.3, Math.max(high ?? 0, 2) * 1.3] } : {} },
-      axes: [{ ...style, size: 34, ...x }, { ...style, size: 52, label: unit || undefined, labelSize: 20, ...(wide ? { splits: decades, filter: (self, places) => places } : {}), ...y }],
+      axes: [
+        { ...style, size: 34, values: labels, space: (self, index, low, high) => Math.max(50, 28 + 7 * exact(Math.trunc(Math.max(-low, high))).length) },
+        {
+          ...style, values: labels, size: (self, texts) => Math.max(52, 17 + 7 * Math.max(0, ...(texts ?? []).map((text) => text.length))),
+          label: unit || undefined, labelSize: 20, ...(wide ? { splits: decades, filter: (self, places) => places } : {}),
+        },
+      ],
       series: [
-        { label: "t in s", value: (self, value) => write(value) },
+        { label: "t in s", value: (self, value) => exact(value) },
         ...curves.map(({ label, ink, dash, column, width = 1.5 }) => ({
           label, dash, stroke: colour(ink), width, value: (self, value) => digits(value),
           // A value between gaps is a point.
