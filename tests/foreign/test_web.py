@@ -702,6 +702,11 @@ TABLES: dict[str, tuple[bytes, dict[str, list[float]]]] = {
     "tab.txt": (b"a\ttime\n1\t0\n2\t1\n", {"time": [0, 1], "a": [1, 2]}),
     "units.csv": (b"time,a\ns,m\n0,1\n1,2\n", {"time": [0, 1], "a": [1, 2]}),
     "units-of-1.csv": (b"time,a,b\n[s],[m],1\n0,1,2\n1,2,3\n", {"time": [0, 1], "a": [1, 2], "b": [2, 3]}),
+    # The numbers are those of `date -u -d TEXT +%s`.
+    "dates.csv": (
+        b"time,a\n2026-12-01,1\n2026-12-01 08:00:00.0005,2\n2026-12-01T10:00:00+01:00,3\n2026-12-01T10:00:00.25Z,4\n",
+        {"time": [1796083200, 1796112000.0005, 1796115600, 1796119200.25], "a": [1, 2, 3, 4]},
+    ),
     "bom.csv": (b"\xef\xbb\xbftime,a\n0,1\n1,2\n", {"time": [0, 1], "a": [1, 2]}),
     "utf16.csv": ("\ufefftime,a\n0,1\n1,2\n".encode("utf-16-le"), {"time": [0, 1], "a": [1, 2]}),
     "zipped.csv.gz": (gzip.compress(b"time,a\n0,1\n1,2\n"), {"time": [0, 1], "a": [1, 2]}),

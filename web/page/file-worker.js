@@ -24,6 +24,15 @@ function number(cell, isComma) {
   return value === value ? value : WORDS[cell.trim()] ?? NaN;
 }
 
+// The time of a cell: a number in s, or a date of ISO 8601 in s since 1970, in UTC unless it states an offset. Date.parse
+// rounds to ms.
+function instant(cell, isComma) {
+  const date = /^(\d{4}-\d\d-\d\d)(?:[T ](\d\d:\d\d(?::\d\d)?)(\.\d+)?)?(?:([+-]\d\d):?(\d\d)|Z)?$/i.exec(cell.trim());
+  if (!date) return number(cell, isComma);
+  const [, day, clock = "00:00", part = "", hours = "+00", minutes = "00"] = date;
+  return Date.parse(`${day}T${clock}${hours}:${minutes}`) / 1000 + Number(`0${part}`);
+}
+
 // The most frequent of tab, semicolon and comma.
 function separatorOf(header) {
   return ["\t", ";", ","].map((letter) => [cells(header, letter).length, letter]).sort(([a], [b]) => b - a)[0][1];
@@ -65,7 +74,7 @@ async function openCsv(file, begin) {
       const advice = separator === "," && parts.length > names.length ? "; numbers with decimal commas need semicolons between them" : "";
       throw new Error(`line ${lineNumber}: expected ${names.length} values as in the header, found ${parts.length}${advice}`);
     }
-    const time = number(parts[place], isComma);
+    const time = instant(parts[place], isComma);
     if (time !== time) {
       if (count === 0 && Object.keys(units).length === 0 && (/^[[(]?s[\])]?$/.test(parts[place].trim()) || parts.every((part) => Number.isNaN(number(part, isComma))))) {
         names.forEach((name, k) => { units[name] = parts[k].trim(); });
@@ -82,7 +91,7 @@ async function openCsv(file, begin) {
         return longer;
       });
     }
-    for (let k = 0; k < parts.length; k += 1) columns[k][count] = number(parts[k], isComma);
+    for (let k = 0; k < parts.length; k += 1) columns[k][count] = k === place ? time : number(parts[k], isComma);
     count += 1;
   };
   let rest = "";
