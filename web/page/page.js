@@ -511,6 +511,9 @@
     }
   };
   id("file").addEventListener("change", () => show(id("file").files[0]));
+  // The same file can be chosen again, when it is written anew; Firefox keeps the file when the page is loaded again.
+  id("file").addEventListener("click", () => { id("file").value = ""; });
+  show(id("file").files[0]);
   document.addEventListener("dragover", (event) => event.preventDefault());
   document.addEventListener("drop", (event) => {
     event.preventDefault();
