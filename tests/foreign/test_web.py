@@ -673,6 +673,16 @@ def test_labels_of_a_narrow_range_of_a_run_differ(open_page):
     assert any(label != round(label, 3) for label in drawn()), "the friction of a cart that sticks is -30.000 N"
 
 
+def test_values_that_hardly_vary_are_drawn_and_zoomed_and_the_page_goes_on(open_page):
+    page = open_page()
+    lines = [f"{t},{1 + 1e-8 * t!r},{-30 - 1e-7 * t!r},{1e5 + 1e-11 * t!r}" for t in range(9)]
+    names, _ = shown(page, "narrow.csv", "\n".join(["time,a,b,c", *lines]).encode())
+    assert names == ["a", "b", "c"]
+    for _ in range(60):
+        page.evaluate("document.querySelector('#dropped .figure').dispatchEvent(new KeyboardEvent('keydown', {key: '+'}))")
+    assert page.evaluate("document.querySelectorAll('#dropped .uplot').length") == 3
+
+
 def test_an_infinite_value_of_a_file_is_a_gap_and_the_axis_is_that_of_the_others(open_page):
     page = open_page()
     drawn = labels(page)

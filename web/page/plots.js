@@ -109,7 +109,22 @@ const digits = (value, count = 6) => (value === null || value === undefined ? "â
 // All digits, as of seconds since 1970 and of a narrow range; uPlot's own labels have three decimals, and its places for
 // those of an axis of time are 50 px wide.
 const exact = (value) => digits(value, 15);
-const labels = (self, places) => places.map((place) => (place === null ? "" : exact(place)));
+const labels = (self, places) => places.map((place) => (place === null ? "" : exact(place || 0)));
+
+// The ticks of an axis. uPlot's own are rounded to 0.3 from 0.29999999 on, and have no end in a range without length.
+function splits(self, index, low, high, step) {
+  const first = Math.ceil(low / step);
+  return step > 0 ? Array.from({ length: Math.floor(high / step) - first + 1 }, (_, k) => (first + k) * step) : [];
+}
+
+// Whether an axis can tell the places of a range apart.
+const isLong = (low, high) => high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high));
+
+// The range of a vertical axis for values; null: there are none.
+function padded(low, high) {
+  const air = isLong(low, high) ? 0.1 * (high - low) : 0.1 * Math.abs(high) || 1;
+  return [low - air, high + air];
+}
 
 // A plot over time. `curves`: {label, ink, column, scale, dash}; `band`: a range to shade; `marks`: a function that
 // returns times to mark; `wide`: the vertical axis is wide near 0.
@@ -135,12 +150,13 @@ class TimePlot {
     const options = {
       width: this.width(),
       height,
+      padding: [null, (self) => 10 + 3.5 * exact(Math.trunc(self.scales.x.max ?? 0)).length, null, null], // half of the last label
       plugins: [{ hooks: { drawClear: shade, drawAxes: mark } }],
-      scales: { x: { time: false }, y: wide ? { distr: 4, asinh: 1, range: (self, low, high) => [Math.min(low ?? 0, -2) * 1.3, Math.max(high ?? 0, 2) * 1.3] } : {} },
+      scales: { x: { time: false }, y: wide ? { distr: 4, asinh: 1, range: (self, low, high) => [Math.min(low ?? 0, -2) * 1.3, Math.max(high ?? 0, 2) * 1.3] } : { range: (self, low, high) => padded(low, high) } },
       axes: [
-        { ...style, size: 34, values: labels, space: (self, index, low, high) => Math.max(50, 28 + 7 * exact(Math.trunc(Math.max(-low, high))).length) },
+        { ...style, size: 34, splits, values: labels, space: (self, index, low, high) => Math.max(50, 28 + 7 * exact(Math.trunc(Math.max(-low, high))).length) },
         {
-          ...style, values: labels, size: (self, texts) => Math.max(52, 17 + 7 * Math.max(0, ...(texts ?? []).map((text) => text.length))),
+          ...style, splits, values: labels, size: (self, texts) => Math.max(52, 17 + 7 * Math.max(0, ...(texts ?? []).map((text) => text.length))),
           label: unit || undefined, labelSize: 20, ...(wide ? { splits: decades, filter: (self, places) => places } : {}),
         },
       ],
@@ -228,6 +244,7 @@ class TimePlot {
 function thinnedAxis(name, plots) {
   const axis = new GrowingAxis(name);
   axis.show = (range) => {
+    if (range !== null && !isLong(...range)) return;
     axis.range = range;
     for (const plot of plots()) plot.update();
     GrowingAxis.prototype.show.call(axis, range);
