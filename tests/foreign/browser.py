@@ -1,4 +1,4 @@
-"""A Chromium without a window, driven by the DevTools protocol."""
+"""A Chromium without a window, driven by the DevTools protocol, and a Firefox, driven by WebDriver BiDi."""
 
 import asyncio
 import base64
@@ -17,6 +17,7 @@ from pathlib import Path
 from tornado.websocket import websocket_connect
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+FIREFOX = shutil.which("firefox") or shutil.which("firefox-esr")
 LIMIT = 120  # s for one answer of the browser
 # Chromium without a window has no mouse; a page may treat that as a touch screen.
 MOUSE = "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
@@ -161,6 +162,46 @@ def browser(folder, width=1200, height=900, flags=()):
         for domain in ("Page", "Runtime", "Network", "Log"):
             page.call(f"{domain}.enable")
         page.call("Target.setAutoAttach", autoAttach=True, waitForDebuggerOnStart=True, flatten=True)
+        yield page
+    finally:
+        process.kill()
+        process.wait()
+        loop.close()
+
+
+class FirefoxPage(Page):
+    """A page of Firefox, for what needs no command of the DevTools protocol."""
+
+    context = ""
+
+    async def _note(self, message):
+        if message.get("method") == "log.entryAdded" and message["params"]["level"] in ("error", "warn"):
+            self.complaints.append(message["params"]["text"])
+
+    def evaluate(self, script):
+        """The value of an expression: a text, a number or a Boolean."""
+        answer = self.call("script.evaluate", expression=script, target={"context": self.context}, awaitPromise=True)
+        assert answer["type"] == "success", answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def open(self, address):
+        self.call("browsingContext.navigate", context=self.context, url=address, wait="complete")
+
+
+@contextmanager
+def firefox(folder):
+    """A page in a new Firefox that asks for less motion; `folder` keeps its profile."""
+    folder.mkdir()
+    (folder / "user.js").write_text('user_pref("ui.prefersReducedMotion", 1);', encoding="ascii")
+    words = [FIREFOX, "--headless", "--no-remote", "--remote-debugging-port", "0", "--profile", folder]
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    loop = asyncio.new_event_loop()
+    try:
+        address = next(line.split()[-1] for line in process.stderr if "WebDriver BiDi listening" in line)
+        page = FirefoxPage(loop, loop.run_until_complete(_connected(f"{address}/session")))
+        page.call("session.new", capabilities={})
+        page.call("session.subscribe", events=["log.entryAdded"])
+        page.context = page.call("browsingContext.getTree")["contexts"][0]["context"]
         yield page
     finally:
         process.kill()

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from browser import CHROMIUM, browser, served
+from browser import CHROMIUM, FIREFOX, browser, firefox, served
 from conftest import ROOT
 
 IN_BOOK = ROOT / "target" / "book" / "paper"
@@ -120,6 +120,17 @@ def test_100_s_of_the_page_are_those_of_the_command_bit_for_bit(aso_ftc, open_pa
     assert len(results["time"]) == 10001 and results["time"][-1] == 100
     equal(results, of_the_command(aso_ftc, page, tmp_path))
     print("100 s were computed in", page.evaluate("document.body.dataset.spent"), "ms")
+
+
+@pytest.mark.skipif(not FIREFOX, reason="no Firefox is installed")
+def test_100_s_in_firefox_are_those_of_the_command_bit_for_bit(aso_ftc, tmp_path):
+    with served(PAGE) as address, firefox(tmp_path / "profile") as page:
+        page.open(f"{address}/index.html")
+        page.until("document.body.dataset.ready === 'true'")
+        results = rows(run_to_the_end(page))
+        assert len(results["time"]) == 10001
+        equal(results, of_the_command(aso_ftc, page, tmp_path))
+        assert page.complaints == []
 
 
 def test_the_claims_are_those_of_the_readme_in_its_words_and_units(open_page):
