@@ -694,6 +694,14 @@ def test_values_that_hardly_vary_are_drawn_and_zoomed_and_the_page_goes_on(open_
     assert page.evaluate("document.querySelectorAll('#dropped .uplot').length") == 3
 
 
+def test_plots_outside_of_the_window_are_printed_with_their_curves(open_page):
+    page = open_page("#stop=6")
+    run_to_the_end(page)
+    image = "canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data"
+    blue = f"((canvas) => {image}.filter((value, k, all) => k % 4 === 2 && value > 150 && all[k - 2] < 50).length)"
+    assert page.evaluate(f"dispatchEvent(new Event('beforeprint')), {blue}(document.querySelector('#command canvas'))") > 300
+
+
 def test_an_infinite_value_of_a_file_is_a_gap_and_the_axis_is_that_of_the_others(open_page):
     page = open_page()
     drawn = labels(page)

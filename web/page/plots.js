@@ -249,6 +249,10 @@ function thinnedAxis(name, plots) {
     for (const plot of plots()) plot.update();
     GrowingAxis.prototype.show.call(axis, range);
   };
+  // Plots outside of the window are old; Firefox prints before uPlot's microtasks.
+  addEventListener("beforeprint", () => {
+    for (const plot of plots()) plot.plot.batch(() => plot.update());
+  });
   return axis;
 }
 
