@@ -89,6 +89,8 @@ pub struct Tuned {
     pub parameters: DVector<f64>,
     /// The largest weighted norm with these parameters.
     pub peak: WeightedPeak,
+    /// What limits gamma: the peak, then the places of the search with at least 0.95 of the largest value, not verified.
+    pub limits: Vec<WeightedPeak>,
 }
 
 impl Tuning<'_> {

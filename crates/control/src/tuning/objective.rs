@@ -4,16 +4,17 @@ use super::minimax::Cut;
 use super::{Transfer, Tuning};
 use crate::blocks::{ComplexMatrix, to_complex};
 use crate::response;
-use crate::robustness::{Loop, Point};
-use crate::stability::instability;
+use crate::robustness::Point;
 use crate::weight::bilinear_frequency;
 use crate::{Domain, Error, StateSpace};
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, Dyn, SymmetricEigen};
 use std::f64::consts::PI;
 
 /// Number of frequencies per decade of the grid, which spans [`DECADES`] decades on each side of the bandwidth.
 const PER_DECADE: i32 = 30;
 const DECADES: i32 = 3;
+/// The largest number of iterations for the eigenvalues of a Hermitian matrix.
+const ITERATIONS: usize = 1000;
 
 /// The examined frequencies, ascending, with the response of the plant and the weights.
 pub(super) struct Grid<'a> {
@@ -79,13 +80,21 @@ impl<'a> Grid<'a> {
         Ok(())
     }
 
-    /// The weighted singular values on the grid, term by term; None if the loop is not stable enough.
+    /// The frequency of a node, in rad/s.
+    pub(super) fn frequency(&self, node: usize) -> f64 {
+        self.nodes[node].frequency
+    }
+
+    /// Each `step`-th frequency of each term.
+    pub(super) fn places(&self, step: usize) -> Vec<Place> {
+        let nodes = (0..self.nodes.len()).step_by(step);
+        let terms = 0..self.tuning.terms.len();
+        nodes.flat_map(|node| terms.clone().map(move |term| Place { term, node })).collect()
+    }
+
+    /// The weighted singular values on the grid, term by term; None if they cannot be computed.
     pub(super) fn values(&self, controller: &StateSpace) -> Option<Vec<Vec<f64>>> {
-        let Tuning { plant, terms, instability: limit, .. } = self.tuning;
-        let closed = Loop::new(plant.clone(), self.tuning.measured(controller)).ok()?;
-        if instability(&closed.dynamics(), plant.domain).ok()? > *limit {
-            return None;
-        }
+        let terms = &self.tuning.terms;
         let transfer = response::Transfer::new(controller);
         let mut values = vec![Vec::with_capacity(self.nodes.len()); terms.len()];
         for node in &self.nodes {
@@ -99,17 +108,18 @@ impl<'a> Grid<'a> {
         Some(values)
     }
 
-    /// The value at `place`, and its derivatives with respect to the parameters.
+    /// The values at `place` for [`pairs`] of vectors u and v, Re(u* X v), and their derivatives with respect to the
+    /// parameters.
     ///
-    /// With X v = sigma u: d sigma = Re(l dK r), l = u* `S_i`, and r = G `S_i` v at the commands,
+    /// d Re(u* X v) = Re(l dK r), l = u* `S_i`, and r = G `S_i` v at the commands,
     /// l = u* `S_o` G, r = `S_o` v at the measurements, l = u* `S_i`, r = `S_o` v for K S. For the tracking error
     /// l = -u* H G `S_i`, r = [G `S_i` `K_r` v; v], with d[K, `K_r`] in place of dK; T has the opposite sign of S.
-    pub(super) fn gradient(
+    pub(super) fn cuts(
         &self,
         controller: &StateSpace,
         differences: &[StateSpace],
         place: Place,
-    ) -> Option<Cut> {
+    ) -> Option<Vec<Cut>> {
         let Node { frequency, plant, weights } = &self.nodes[place.node];
         let (weight, transfer) = (weights[place.term], self.tuning.terms[place.term].transfer);
         let (order, s) = (controller.a.nrows(), controller.domain.point(*frequency));
@@ -119,41 +129,44 @@ impl<'a> Grid<'a> {
         let k = &c * forward.solve(&b)? + to_complex(&controller.d);
         let (t, p) = self.tuning.references.shape();
         let closed = ClosedLoop::new(&k, plant, &self.tuning.references)?;
-        let (sigma, u, v) = largest(&closed.transfer(transfer))?;
-        let (left, right) = match transfer {
-            Transfer::Sensitivity(Point::Input) | Transfer::Complementary(Point::Input) => {
-                (u.adjoint() * &closed.at_input, plant * &closed.at_input * v)
-            }
-            Transfer::Sensitivity(Point::Output) | Transfer::Complementary(Point::Output) => {
-                (u.adjoint() * &closed.at_output * plant, &closed.at_output * v)
-            }
-            Transfer::Effort => (u.adjoint() * &closed.at_input, &closed.at_output * v),
-            Transfer::Tracking => {
-                let left = -(u.adjoint() * &closed.h_g * &closed.at_input);
-                let measured = plant * &closed.at_input * &closed.k_r * &v;
-                let mut right = measured.resize_vertically(p + t, Complex::from(0.0));
-                right.rows_mut(p, t).copy_from(&v);
-                (left, right)
-            }
-        };
-        // For the other transfer functions, the part of the references is zero.
-        let right = right.resize_vertically(p + t, Complex::from(0.0));
+        let value = closed.transfer(transfer);
         let sign = if matches!(transfer, Transfer::Complementary(_)) { -1.0 } else { 1.0 };
-        let x = forward.solve(&(&b * &right))?;
-        let y = backward.solve(&(&left * &c).transpose())?.transpose();
         let real = |row: &ComplexMatrix, column: &ComplexMatrix| (column * row).map(|one| one.re);
-        // Re(row M column) is the sum of the entries of M' and Re(column row).
-        let [of_a, of_b, of_c, of_d] =
-            [real(&y, &x), real(&y, &right), real(&left, &x), real(&left, &right)];
-        let slope = |one: &StateSpace| {
-            of_a.dot(&one.a.transpose())
-                + of_b.dot(&one.b.transpose())
-                + of_c.dot(&one.c.transpose())
-                + of_d.dot(&one.d.transpose())
+        let cut = |(u, v): &(ComplexMatrix, ComplexMatrix)| {
+            let (left, right) = match transfer {
+                Transfer::Sensitivity(Point::Input) | Transfer::Complementary(Point::Input) => {
+                    (u.adjoint() * &closed.at_input, plant * &closed.at_input * v)
+                }
+                Transfer::Sensitivity(Point::Output) | Transfer::Complementary(Point::Output) => {
+                    (u.adjoint() * &closed.at_output * plant, &closed.at_output * v)
+                }
+                Transfer::Effort => (u.adjoint() * &closed.at_input, &closed.at_output * v),
+                Transfer::Tracking => {
+                    let left = -(u.adjoint() * &closed.h_g * &closed.at_input);
+                    let measured = plant * &closed.at_input * &closed.k_r * v;
+                    let mut right = measured.resize_vertically(p + t, Complex::from(0.0));
+                    right.rows_mut(p, t).copy_from(v);
+                    (left, right)
+                }
+            };
+            // For the other transfer functions, the part of the references is zero.
+            let right = right.resize_vertically(p + t, Complex::from(0.0));
+            let x = forward.solve(&(&b * &right))?;
+            let y = backward.solve(&(&left * &c).transpose())?.transpose();
+            // Re(row M column) is the sum of the entries of M' and Re(column row).
+            let [of_a, of_b, of_c, of_d] =
+                [real(&y, &x), real(&y, &right), real(&left, &x), real(&left, &right)];
+            let slope = |one: &StateSpace| {
+                of_a.dot(&one.a.transpose())
+                    + of_b.dot(&one.b.transpose())
+                    + of_c.dot(&one.c.transpose())
+                    + of_d.dot(&one.d.transpose())
+            };
+            let slopes = differences.iter().map(|one| sign * weight * slope(one));
+            let gradient = DVector::from_iterator(differences.len(), slopes);
+            Some(Cut { value: weight * (u.adjoint() * &value * v)[0].re, gradient })
         };
-        let slopes = differences.iter().map(|one| sign * weight * slope(one));
-        let gradient = DVector::from_iterator(differences.len(), slopes);
-        Some(Cut { value: weight * sigma, gradient })
+        pairs(&value)?.iter().map(cut).collect()
     }
 }
 
@@ -188,29 +201,38 @@ fn norm(x: &ComplexMatrix) -> Option<f64> {
     if x.ncols() == 1 || x.nrows() == 1 {
         return Some(x.norm()).filter(|value| value.is_finite());
     }
-    if x.iter().any(|entry| !(entry.re.is_finite() && entry.im.is_finite())) {
-        return None;
-    }
-    response::singular_values(x).ok()?.first().copied()
+    Some(squares(x)?.eigenvalues.max().sqrt())
 }
 
-/// The largest singular value with its vectors: X v = sigma u.
-fn largest(x: &ComplexMatrix) -> Option<(f64, ComplexMatrix, ComplexMatrix)> {
-    let sigma = norm(x)?;
-    // The vector by inverse iteration on sigma^2 (1 + eps) I - X* X, whose smallest eigenvalue is near zero.
+/// The eigenvalues and eigenvectors of X* X; None for an entry that is not finite.
+fn squares(x: &ComplexMatrix) -> Option<SymmetricEigen<Complex<f64>, Dyn>> {
     let squares = x.adjoint() * x;
-    let shift = Complex::from(sigma * sigma * (1.0 + 1e-9) + f64::MIN_POSITIVE);
-    let inverse =
-        (ComplexMatrix::identity(x.ncols(), x.ncols()) * shift - &squares).try_inverse()?;
-    let column = (0..x.ncols())
-        .max_by(|&i, &j| inverse.column(i).norm().total_cmp(&inverse.column(j).norm()))?;
-    let mut v: ComplexMatrix = inverse.columns(column, 1).into();
-    for _ in 0..3 {
-        v = &inverse * &v;
-        v /= Complex::from(v.norm());
+    let is_finite = squares.iter().all(|entry| entry.is_finite());
+    is_finite.then(|| SymmetricEigen::try_new(squares, f64::EPSILON, ITERATIONS)).flatten()
+}
+
+/// Pairs of unit vectors u and v: the first two of X v = sigma u, and four for which Re(u* X v) is the mean of their
+/// singular values. No pair has a larger Re(u* X v) than the largest singular value, so that these functions describe it
+/// also where two singular values are equal and it has no gradient.
+fn pairs(x: &ComplexMatrix) -> Option<Vec<(ComplexMatrix, ComplexMatrix)>> {
+    let squares = squares(x)?;
+    let mut order: Vec<_> = (0..x.ncols()).collect();
+    order.sort_by(|&i, &j| squares.eigenvalues[j].total_cmp(&squares.eigenvalues[i]));
+    order.truncate(x.nrows().min(2));
+    let pair = |at: &usize| {
+        let v: ComplexMatrix = squares.eigenvectors.columns(*at, 1).into();
+        let u = x * &v;
+        let size = Complex::from(u.norm().max(f64::MIN_POSITIVE));
+        (u / size, v)
+    };
+    let mut pairs: Vec<_> = order.iter().map(pair).collect();
+    if let [(u, v), (other_u, other_v)] = pairs.as_slice() {
+        let half = Complex::from(0.5_f64.sqrt());
+        let means = [1.0.into(), (-1.0).into(), Complex::i(), -Complex::i()]
+            .map(|phase| ((u + other_u * phase) * half, (v + other_v * phase) * half));
+        pairs.extend(means);
     }
-    let u = x * &v / Complex::from(sigma.max(f64::MIN_POSITIVE));
-    Some((sigma, u, v))
+    Some(pairs)
 }
 
 #[cfg(test)]
@@ -286,9 +308,13 @@ mod tests {
             let node = 80;
             for term in 0..transfers.len() {
                 let place = Place { term, node };
-                let Cut { value, gradient } =
-                    grid.gradient(&nominal, &differences, place).expect("a gradient");
+                let cuts = grid.cuts(&nominal, &differences, place).expect("a gradient");
+                let Cut { value, gradient } = &cuts[0];
                 assert!((value - values(&nominal)?[term][node]).abs() < 1e-8 * value);
+                if let [first, second, means @ ..] = cuts.as_slice() {
+                    let mean = f64::midpoint(first.value, second.value);
+                    assert!(means.iter().all(|cut| (cut.value - mean).abs() < 1e-12 * *value));
+                }
                 for at in 0..start.len() {
                     let after = |by: f64| Ok::<_, Error>(values(&moved(at, by))?[term][node]);
                     let expected = (after(1e-5)? - after(-1e-5)?) / 2e-5;

@@ -104,7 +104,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             tuning.instability = decay * excess.min(0.0);
             if examine_only {
                 let peak = tuning.peak(initial)?;
-                return Ok(Tuned { parameters: initial.clone(), peak });
+                return Ok(Tuned { parameters: initial.clone(), peak, limits: Vec::new() });
             }
             tuning.tuned(initial, &self.joined(&sizes))
         };
@@ -122,7 +122,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let tuned = tuned.into_iter().collect::<Result<Vec<_>, Error>>()?;
         let best =
             tuned.into_iter().min_by(|one, other| one.peak.gamma.total_cmp(&other.peak.gamma));
-        let Some(Tuned { parameters, peak }) = best else {
+        let Some(Tuned { parameters, peak, limits }) = best else {
             return Err(refusal.unwrap_or(Error::Overflow { what: "the loop of each start" }));
         };
         let [feedback, observer] = self.divided(&parameters, &starts[0]);
@@ -131,11 +131,8 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         Ok(ShapedGains {
             feedback: unique(feedback, method.clone()),
             observer: unique(observer, method),
-            warning: (peak.gamma > 1.0).then(|| {
-                let help = self.help(&terms[peak.term], &peak);
-                let help = help.map_or_else(String::new, |entry| format!(": {entry} helps"));
-                format!("{summary}; expected at most 1{help}")
-            }),
+            warning: (peak.gamma > 1.0)
+                .then(|| format!("{summary}; expected at most 1{}", self.help(&terms, &limits))),
         })
     }
 
@@ -158,15 +155,31 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         gains
     }
 
-    /// Returns the entry of the plant file that relaxes the term which limits gamma; None if |S| or |T| is so large
-    /// there that the verdict would be red with another limit, too.
-    fn help(&self, term: &Term, peak: &WeightedPeak) -> Option<&'static str> {
-        let frequency = peak.frequency;
-        let mapped = bilinear_frequency(frequency, self.model.domain);
-        let is_red = peak.gamma > self.red * term.weight.magnitude(mapped);
-        Some(match term.transfer {
+    /// Returns the entries of the plant file that relax all that limits gamma; nothing if the first of `limits`, an |S|
+    /// or |T|, is so large that the verdict would be red with other entries, too.
+    fn help(&self, terms: &[Term], limits: &[WeightedPeak]) -> String {
+        let is_red = |limit: &WeightedPeak| {
+            let Term { transfer, weight } = &terms[limit.term];
+            let mapped = bilinear_frequency(limit.frequency, self.model.domain);
+            !matches!(transfer, Transfer::Effort | Transfer::Tracking)
+                && limit.gamma > self.red * weight.magnitude(mapped)
+        };
+        let mut entries: Vec<_> =
+            limits.iter().map(|limit| self.entry(&terms[limit.term], limit.frequency)).collect();
+        entries.sort_unstable();
+        entries.dedup();
+        match entries.as_slice() {
+            _ if limits.first().is_some_and(is_red) => String::new(),
+            [] => String::new(),
+            [entry] => format!(": {entry} helps"),
+            [first @ .., last] => format!(": {} and {last} help together", first.join(", ")),
+        }
+    }
+
+    /// Returns the entry that relaxes a term at a frequency in rad/s.
+    fn entry(&self, term: &Term, frequency: f64) -> &'static str {
+        match term.transfer {
             Transfer::Effort => "a higher `effort`",
-            Transfer::Sensitivity(_) | Transfer::Complementary(_) if is_red => return None,
             // A constant weight depends on `peak` alone.
             _ if term.weight.as_constant().is_some() => "a higher `peak`",
             Transfer::Sensitivity(_) if frequency < self.shape.bandwidth => "a lower `bandwidth`",
@@ -175,7 +188,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             Transfer::Sensitivity(_) | Transfer::Complementary(_) | Transfer::Tracking => {
                 "a higher `peak`"
             }
-        })
+        }
     }
 
     /// Returns the controller with its filter and its integrals, in `units`; its inputs are the measurements, then the
