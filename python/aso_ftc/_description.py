@@ -112,6 +112,9 @@ class ModelDescription(Mapping[str, Variable]):
     def __len__(self) -> int:
         return len(self._by_name)
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self._by_name)
+
     def __repr__(self) -> str:
         return f"<ModelDescription: {self.model_name}, FMI {self.fmi_version}, {len(self)} variables>"
 

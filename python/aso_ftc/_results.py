@@ -120,6 +120,9 @@ class Results(Mapping[str, "NDArray[Any]"]):
     def __contains__(self, name: object) -> bool:
         return name in self.names or name in self._arrays
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*self.names, *self._arrays]
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Results):
             return NotImplemented

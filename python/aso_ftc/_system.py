@@ -514,6 +514,9 @@ class Simulation:
     def __contains__(self, name: object) -> bool:
         return name in self._names or name in self._arrays
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*self._names, *self._arrays]
+
     def __enter__(self) -> Simulation:
         return self
 

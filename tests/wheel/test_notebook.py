@@ -3,6 +3,7 @@
 import ast
 from pathlib import Path
 
+import aso_ftc as af
 import pytest
 
 NOTEBOOK = Path(__file__).resolve().parents[2] / "python" / "examples" / "pendulum.ipynb"
@@ -20,3 +21,16 @@ def test_the_notebook_runs_and_its_paper_observer_keeps_the_cart_within_1_mm(tmp
     swings = next(ast.literal_eval(text) for text in texts if text.startswith("[173"))
     # Patton and Klinkhieo (2009) state 165 mm without and below 1 mm with compensation.
     assert len(swings) == 7 and swings == sorted(swings, reverse=True) and 0.9 < swings[-1] < 1.0
+
+
+def test_tab_completes_the_names_of_variables_in_brackets():
+    shell = pytest.importorskip("IPython.core.interactiveshell").InteractiveShell()
+    description = af.read_model_description(af.fmus()["FrictionPendulum"])
+    with af.paper().simulation(stop_time=0.1) as simulation:
+        shell.push({"results": af.paper().run(stop_time=0.1), "simulation": simulation, "description": description})
+        for written, expected in {
+            "results['controller.x_hat": {f"controller.x_hat{index}" for index in ("", "[1]", "[2]", "[3]", "[4]")},
+            "simulation['plant.x_p": {"plant.x_p", "plant.x_p_0"},
+            "description['x_p": {"x_p", "x_p_0"},
+        }.items():
+            assert {match.rpartition("'")[2] for match in shell.complete(written)[1]} == expected
