@@ -12,6 +12,7 @@ _OPTIONS = {
     "compile": "aso_ftc.compile",
     "certificate-time": "`aso-ftc design --certificate-time`",
     "connect": "connect",
+    "force": "force=True",
     "gain-time": "`aso-ftc design --gain-time`",
     "isolate": "isolate=True",
     "log-calls": "a log of calls",

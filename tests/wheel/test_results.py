@@ -152,3 +152,19 @@ def test_a_report_is_a_page_of_a_file_of_any_program(results, tmp_path):
     with pytest.raises(af.ResultsError, match="line 3: time is 0 after 1") as raised:
         af.report(other)
     assert raised.value.kind == "Report"
+
+
+def test_a_report_of_results_in_memory_is_that_of_their_files(paper, results, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    against = paper.run(start_values={"plant.F_c": 20.0})
+    for name, source in {"results": results, "against": against}.items():
+        source.to_parquet(f"{name}.parquet")
+    expected = af.report("results.parquet", against="against.parquet", out="files.html").read_bytes()
+    page = af.report(results, against=against, out="memory.html")
+    assert page.read_bytes() == expected
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["against.parquet", "files.html", "memory.html", "results.parquet"]
+    with pytest.raises(TypeError, match="out: expected the path of the page"):
+        af.report(results)
+    page.write_text("mine", encoding="utf-8")
+    with pytest.raises(af.ResultsError, match="force=True overwrites it"):
+        af.report(results, out=page)
