@@ -262,6 +262,7 @@ def test_a_measure_from_the_start_of_a_fault_is_nan_in_the_run_without_one(text)
         ({"parameters": {"plant.F_c": {"distribution": "nrom"}}}, "scipy.stats"),
         ({"parameters": {"plant.F_c": {"distribution": "gamma"}}}, "needs a"),
         ({"parameters": {"plant.F_c": {"distribution": "norm", "sigma": 1.0}}}, "unknown entry sigma"),
+        ({"design": {"method": "grid", "points": 4}}, "design: unknown entry points: expected method"),
         ({"parameters": {"plant.F_c": {"distribution": "norm", "scale": -1.0}}}, "out of range"),
         (
             {

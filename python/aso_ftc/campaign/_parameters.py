@@ -251,7 +251,7 @@ def _options(design: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
         hint = similar(method, METHODS)
         raise fail("design", f"method = {method!r}: expected one of {', '.join(METHODS)}{hint}")
     options = {**_OPTIONAL.get(method, {}), **{key: value for key, value in design.items() if key != "method"}}
-    _unknown("design", options, list(METHODS[method]))
+    _unknown("design", options, ["method", *METHODS[method]])
     for entry, least in METHODS[method].items():
         if entry not in options:
             raise fail("design", f"method {method} needs {entry}")
