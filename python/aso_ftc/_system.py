@@ -112,9 +112,9 @@ class System:
     ) -> None:
         self._folder = os.path.abspath(os.fspath(folder) if folder is not None else os.getcwd())
         config = {} if description is None else description
-        if not isinstance(config, (str, Mapping)):
-            kind = type(config).__name__
-            raise TypeError(f"expected the text of a system.toml or a dict, found {kind}")
+        if not isinstance(config, (str, Mapping)) or (isinstance(config, str) and os.path.isfile(config)):
+            found = f"the file {config}" if isinstance(config, str) else type(config).__name__
+            raise TypeError(f"expected the text of a system.toml or a dict, found {found}; System.from_toml reads files")
         self._adopt(_core.check_configuration(config, self._folder))
         self._slaves: dict[str, Slave] = {}
         self._cache: tuple[dict[str, Any], dict[str, Slave], _core.Study] | None = None
@@ -678,6 +678,11 @@ def _changes(
     """Return the entries of a ``system.toml`` that the arguments of a run state."""
     if isinstance(record, str) or isinstance(exclude, str):
         raise TypeError("record and exclude are lists of names, found a str")
+    for name, value in {"faults": faults, "settings": settings, "signals": signals}.items():
+        if isinstance(value, Mapping):
+            raise TypeError(f"{name} is a list of dicts, found a dict")
+    if isinstance(algorithm, str):
+        raise TypeError(f'algorithm is a dict, such as {{"method": "jacobi"}}, found the text {algorithm!r}')
     recorded = None if record is None else list(record)
     if recorded is not None and not recorded:
         record_every = "never"

@@ -62,6 +62,19 @@ def test_a_keyword_that_is_wrong_is_named_with_the_right_one(call):
             call(pendulum(), **{name: 1})
 
 
+def test_an_argument_of_another_type_is_named_with_the_expected_one(paper, tmp_path):
+    path = tmp_path / "system.toml"
+    path.write_text(paper.to_toml(), encoding="utf-8")
+    for call, text in [
+        (lambda: paper.run(faults=af.fault("controller.x_p", "bias", value=0.1)), "faults is a list of dicts"),
+        (lambda: paper.run(algorithm="jacobi"), "algorithm is a dict, .* found the text 'jacobi'"),
+        (lambda: af.System(str(path)), "System.from_toml reads files"),
+        (lambda: af.System(path), "System.from_toml reads files"),
+    ]:
+        with pytest.raises(TypeError, match=text):
+            call()
+
+
 def test_every_keyword_of_fmpy_that_is_missing_here_has_an_answer_or_is_unknown():
     import inspect
 
