@@ -141,7 +141,7 @@ impl PythonSlave {
                 let what = format!("no output {name}, expected one of {}", known.join(", "));
                 return Err(PyValueError::new_err(what));
             };
-            let value: f64 = value.extract()?;
+            let value = number("the output", &name, &value)?;
             if matches!(self.description.variables[position].kind, Kind::Integer(_)) {
                 check_integer("the output", &name, value).map_err(PyValueError::new_err)?;
             }
@@ -352,7 +352,7 @@ fn declarations(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(Str
         let items = mapping.items()?;
         let item = |item: Bound<'_, PyAny>| {
             let (name, value): (String, Bound<'_, PyAny>) = item.extract()?;
-            Ok((name, start(&value)?))
+            start(&name, &value).map(|start| (name, start))
         };
         return items.iter().map(item).collect();
     }
@@ -360,7 +360,7 @@ fn declarations(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(Str
 }
 
 /// Reads a start value. A bool is an int in Python, so the test for bool is first.
-fn start(value: &Bound<'_, PyAny>) -> PyResult<Start> {
+fn start(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Start> {
     use pyo3::types::{PyBool, PyInt};
     // `item` converts a scalar of `NumPy`, which is neither an int nor a bool of Python.
     let scalar = if value.hasattr("item")? { value.call_method0("item")? } else { value.clone() };
@@ -370,7 +370,17 @@ fn start(value: &Bound<'_, PyAny>) -> PyResult<Start> {
     if scalar.is_instance_of::<PyInt>() {
         return scalar.extract().map(Start::Integer);
     }
-    scalar.extract().map(Start::Real)
+    number("the start value of", name, &scalar).map(Start::Real)
+}
+
+/// Reads a number; the `TypeError` of another object names the variable.
+fn number(what: &str, name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let Ok(number) = value.extract::<f64>() else {
+        let kind = value.get_type().name()?;
+        let sentence = format!("{what} {name}: expected a number, found {kind}");
+        return Err(PyTypeError::new_err(sentence));
+    };
+    Ok(number)
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "an integer")]

@@ -428,6 +428,19 @@ def test_an_exception_of_a_python_object_is_the_cause_of_the_error():
         loop(Unknown(1.0)).run()
 
 
+def test_an_output_that_is_no_number_is_named():
+    class Text(Proportional):
+        def step(self, t, dt, inputs):
+            return {"u": "1.0"}
+
+    with pytest.raises(af.RunError, match="raised TypeError: the output u: expected a number, found str"):
+        loop(Text(1.0)).run()
+    start = Proportional(1.0)
+    start.outputs = {**Proportional.outputs, "u": None}
+    with pytest.raises(TypeError, match="the start value of u: expected a number, found NoneType"):
+        loop(start).run()
+
+
 def test_an_output_that_starts_with_an_integer_is_not_cut():
     class Half(Proportional):
         def step(self, t, dt, inputs):
