@@ -333,6 +333,9 @@ class Controller:
         self._design = design
         self._designed = design._designed
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Controller, (self._design,)
+
     @property
     def system(self) -> Any:
         """The controller from measurements to commands, limits aside, as a ``control.StateSpace``."""

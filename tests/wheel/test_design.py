@@ -249,6 +249,7 @@ def test_the_plots_show_the_peaks_of_s_and_the_responses_to_a_fault(servo):
 def test_a_design_travels_and_is_changed(servo):
     copy = pickle.loads(pickle.dumps(servo))
     assert copy.report == servo.report and copy.design_file == servo.design_file
+    assert np.array_equal(pickle.loads(pickle.dumps(servo.controller)).system.A, servo.controller.system.A)
     faster = servo.with_(observer={"eigenvalues": [-8, -9, -10]})
     assert np.allclose(np.sort(faster.eigenvalues["observer"].real), [-10, -9, -8])
     assert np.array_equal(faster.K_x, servo.K_x) and faster.L.shape == (3, 1)
