@@ -15,7 +15,9 @@ def page(summary: str, head: Iterable[object], rows: Iterable[Iterable[object]],
     """Return a summary and a table as HTML; ``more`` is the number of rows that are left out."""
 
     def row(cells: Iterable[object], tag: str) -> str:
-        return "<tr>" + "".join(f"<{tag}>{html.escape(str(cell))}</{tag}>" for cell in cells) + "</tr>"
+        # Some viewers, such as marimo, have no space between the cells of tables.
+        start = f'<{tag} style="padding: 0.25em 0.6em">'
+        return "<tr>" + "".join(f"{start}{html.escape(str(cell))}</{tag}>" for cell in cells) + "</tr>"
 
     body = "".join(row(cells, "td") for cells in rows)
     rest = f"<p>and {more} more</p>" if more > 0 else ""

@@ -317,7 +317,7 @@ def test_a_notebook_shows_the_measures_with_names_escaped(tmp_path):
     page = write(
         tmp_path / "c", {"method": "grid"}, {"p": np.arange(3.0)}, values, limits=limits
     )._repr_html_()
-    assert "<b>" not in page and "&lt;b&gt;y" in page and "below 2.5" in page and "<td>2</td>" in page
+    assert "<b>" not in page and "&lt;b&gt;y" in page and "below 2.5" in page and ">2</td>" in page
 
 
 @pytest.mark.skipif(os.name == "nt", reason="the command line is for a POSIX shell")
