@@ -293,7 +293,8 @@ class Design:
 
     def _repr_html_(self) -> str:
         rows = [("yes" if check["holds"] else "no", check["condition"]) for check in self.checks]
-        return page(f"{self.report['description']}: {self.verdict}", ("holds", "condition"), rows)
+        verdict = "; ".join([self.verdict, *self.reasons])
+        return page(f"{self.report['description']}: {verdict}", ("holds", "condition"), rows)
 
     def __str__(self) -> str:
         import numpy

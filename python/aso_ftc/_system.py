@@ -286,7 +286,9 @@ class System:
         sources: dict[str, list[str]] = {}
         for entry in self._rest.get("connections", []):
             sources.setdefault(entry["to"].partition(".")[0], []).append(f"{entry['from']} to {entry['to']}")
-        rows = [(name, file, "; ".join(sources.get(name, ()))) for name, file in [*fmus, *slaves]]
+        by_name = not sources and "system" not in self._rest and len(fmus) + len(slaves) > 1
+        others = ("by equal names",) if by_name else ()
+        rows = [(name, file, "; ".join(sources.get(name, others))) for name, file in [*fmus, *slaves]]
         return page(repr(self), ("name", "FMU or object", "connections to it"), rows)
 
     def files(self) -> dict[str, str]:

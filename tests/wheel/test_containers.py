@@ -89,6 +89,13 @@ def test_every_representation_is_short_and_every_page_is_a_table(paper, pendulum
     assert "<script>" not in af.System().add(name, pendulum)._repr_html_()
 
 
+def test_the_table_of_a_system_says_how_its_fmus_are_connected(paper, pendulum):
+    assert paper._repr_html_().count("by equal names") == 2
+    stated = paper.copy().connect("controller.u", "plant.u")._repr_html_()
+    assert "by equal names" not in stated and "controller.u to plant.u" in stated
+    assert "by equal names" not in af.System().add("plant", pendulum)._repr_html_()
+
+
 def test_an_overview_has_what_fmpy_dumps(pendulum, capsys):
     fmpy = pytest.importorskip("fmpy")
     text = str(af.read_model_description(pendulum))

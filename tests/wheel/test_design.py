@@ -122,6 +122,11 @@ def test_the_source_code_of_a_sampled_controller_is_written(tmp_path):
         af.design(pendulum).controller.c_code(tmp_path / "none")
 
 
+def test_the_table_of_a_design_has_the_reasons_of_its_verdict(design):
+    assert design.verdict == "red" and all(reason in design._repr_html_() for reason in design.reasons)
+    assert design.reasons == ["the peak of S at the output is 5.583, above 4 (red)"]
+
+
 def test_a_kalman_filter_needs_the_fmu_of_the_plant(design, tmp_path):
     with pytest.raises(af.DesignError, match="states an FMU"):
         design.controller.kalman_fmu(tmp_path / "Filter.fmu", base=af.fmus()["AsoController"])
