@@ -189,6 +189,18 @@ def wait_for(condition, limit=90.0):
         time.sleep(0.02)
 
 
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no groups of processes here")
+def test_ctrl_c_on_a_terminal_ends_in_one_sentence(campaign, tmp_path):
+    folder = tmp_path / "out"
+    process = command(campaign(runs=2000, stop=2.0), "--out", folder, "--workers", 2, start_new_session=True)
+    wait_for(lambda: parts(folder) >= 1 or process.poll() is not None)
+    # A terminal sends the signal to the workers, too.
+    os.killpg(process.pid, signal.SIGINT)
+    _, messages = process.communicate(timeout=60)
+    assert messages == "error: interrupted; the same command goes on where it stopped\n"
+    assert process.returncode == 130
+
+
 def test_rows_stay_the_same_if_worker_client_and_scheduler_are_killed(campaign, tmp_path, cluster):
     file, folder = campaign(runs=120, stop=2.0), tmp_path / "out"
     words = (file, "--out", folder, "--scheduler", cluster.address)

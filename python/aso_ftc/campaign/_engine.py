@@ -8,11 +8,13 @@ import logging
 import math
 import os
 import pickle
+import signal
 import sys
 import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -183,22 +185,42 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
                 client.close(timeout=5)
         return
     count = os.cpu_count() or 1 if workers is None else workers
-    with tempfile.TemporaryDirectory(prefix="aso-ftc-") as place:
-        cluster = distributed.LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=":0",
-            local_directory=place,
-            silence_logs=logging.CRITICAL,
-        )
+    with tempfile.TemporaryDirectory(prefix="aso-ftc-") as place, contextlib.ExitStack() as opened:
+        with _without_interrupts():
+            cluster = distributed.LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=":0",
+                local_directory=place,
+                silence_logs=logging.CRITICAL,
+            )
+            opened.callback(cluster.close, timeout=10)
         client = distributed.Client(cluster, set_as_default=False)
         try:
             yield client
         finally:
             with contextlib.suppress(Exception):
                 client.close(timeout=5)
-            cluster.close(timeout=10)
+
+
+@contextlib.contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Let processes that are started here, and by threads that are started here, ignore Ctrl-C.
+
+    A terminal and a notebook send it to all of them, and each worker of Dask would print its traceback. For this
+    process it counts at the end of the block.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    # It removes the signal from the mask of the thread that starts it.
+    resource_tracker.ensure_running()
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 class _Plugin:
