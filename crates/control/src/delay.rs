@@ -272,7 +272,7 @@ impl Delays {
     }
 
     /// The response G, p x m, with exact delays at each of `frequencies`.
-    fn responses(
+    pub(crate) fn responses(
         &self,
         plant: &StateSpace,
         domain: Domain,

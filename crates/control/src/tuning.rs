@@ -19,6 +19,7 @@ mod structured;
 pub use structured::Structure;
 
 use crate::blocks::{beside, block_2x2, stacked};
+use crate::delay::Delays;
 use crate::response::h_infinity;
 use crate::robustness::{Loop, Point};
 use crate::weight::Weight;
@@ -65,6 +66,10 @@ pub struct Tuning<'a> {
     pub instability: f64,
     /// Whether the search may use the given theta.
     pub is_allowed: &'a (dyn Fn(&DVector<f64>) -> bool + Sync),
+    /// The delays that `plant` approximates.
+    pub delays: &'a Delays,
+    /// G without its delays, in continuous time and in the units of `plant`.
+    pub undelayed: StateSpace,
     /// The bandwidth in rad/s; the search examines frequencies from a thousandth of it to a thousand times it.
     pub rate: f64,
     /// Whether the search must end; called after each step.
@@ -89,6 +94,8 @@ pub struct Tuned {
     pub parameters: DVector<f64>,
     /// The largest weighted norm with these parameters.
     pub peak: WeightedPeak,
+    /// Gamma or, if it is larger, the largest value of the search, which counts the deviation by delays, too.
+    pub largest: f64,
     /// What limits gamma: the peak, then the places of the search with at least 0.95 of the largest value, not verified.
     pub limits: Vec<WeightedPeak>,
 }
@@ -209,8 +216,11 @@ mod tests {
             let (a, d) = (one(domain.constant() - 1.0), one(-parameters[0]));
             Ok(StateSpace { a, b: one(0.0), c: one(0.0), d, domain })
         };
+        let plant = StateSpace { a: one(a), b: one(1.0), c: one(1.0), d: one(0.0), domain };
         let tuning = Tuning {
-            plant: StateSpace { a: one(a), b: one(1.0), c: one(1.0), d: one(0.0), domain },
+            delays: &Delays { inputs: vec![0.0], outputs: vec![0.0] },
+            undelayed: plant.clone(),
+            plant,
             controller: &controller,
             references: DMatrix::zeros(0, 1),
             terms: terms.to_vec(),

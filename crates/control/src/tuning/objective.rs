@@ -13,6 +13,8 @@ use std::f64::consts::PI;
 /// Number of frequencies per decade of the grid, which spans [`DECADES`] decades on each side of the bandwidth.
 const PER_DECADE: i32 = 30;
 const DECADES: i32 = 3;
+/// Largest singular value of S K times the deviation of the plant by its delays, with which gamma is 1.
+const DEVIATION: f64 = 0.1;
 /// The largest number of iterations for the eigenvalues of a Hermitian matrix.
 const ITERATIONS: usize = 1000;
 
@@ -25,11 +27,13 @@ pub(super) struct Grid<'a> {
 struct Node {
     frequency: f64,
     plant: ComplexMatrix,
-    /// The magnitude of the weight of each term.
+    /// The plant with the delays themselves less `plant`; None without delays.
+    deviation: Option<ComplexMatrix>,
+    /// The magnitude of the weight of each term, then that of the deviation by delays.
     weights: Vec<f64>,
 }
 
-/// A term at a frequency of the grid.
+/// A term at a frequency of the grid; the deviation by delays follows the terms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
     pub(super) term: usize,
@@ -61,7 +65,7 @@ impl<'a> Grid<'a> {
     /// Adds a frequency, limited to six decades on both sides of the bandwidth, and in sampled time to just below half
     /// of the sampling rate.
     pub(super) fn add(&mut self, frequency: f64) -> Result<(), Error> {
-        let Tuning { plant, terms, rate, .. } = self.tuning;
+        let Tuning { plant, terms, rate, delays, undelayed, .. } = self.tuning;
         let lowest = rate * 10_f64.powi(-2 * DECADES);
         let highest = match plant.domain {
             Domain::Continuous => rate * 10_f64.powi(2 * DECADES),
@@ -75,8 +79,12 @@ impl<'a> Grid<'a> {
         }
         let gain = response::Transfer::new(plant).gain(frequency)?;
         let mapped = bilinear_frequency(frequency, plant.domain);
-        let weights = terms.iter().map(|term| term.weight.magnitude(mapped)).collect();
-        self.nodes.insert(at, Node { frequency, plant: gain, weights });
+        let weights = terms.iter().map(|term| term.weight.magnitude(mapped));
+        let weights = weights.chain([1.0 / DEVIATION]).collect();
+        let exact = || delays.responses(undelayed, plant.domain, &[frequency]);
+        let exact = delays.any().then(exact).transpose()?;
+        let deviation = exact.and_then(|mut all| all.pop()).map(|exact| exact - &gain);
+        self.nodes.insert(at, Node { frequency, plant: gain, deviation, weights });
         Ok(())
     }
 
@@ -85,23 +93,28 @@ impl<'a> Grid<'a> {
         self.nodes[node].frequency
     }
 
+    /// The transfer function of each term; None for the deviation by delays.
+    fn transfers(&self) -> impl Iterator<Item = Option<Transfer>> {
+        let Tuning { terms, delays, .. } = self.tuning;
+        terms.iter().map(|term| Some(term.transfer)).chain(delays.any().then_some(None))
+    }
+
     /// Each `step`-th frequency of each term.
     pub(super) fn places(&self, step: usize) -> Vec<Place> {
         let nodes = (0..self.nodes.len()).step_by(step);
-        let terms = 0..self.tuning.terms.len();
+        let terms = 0..self.transfers().count();
         nodes.flat_map(|node| terms.clone().map(move |term| Place { term, node })).collect()
     }
 
     /// The weighted singular values on the grid, term by term; None if they cannot be computed.
     pub(super) fn values(&self, controller: &StateSpace) -> Option<Vec<Vec<f64>>> {
-        let terms = &self.tuning.terms;
         let transfer = response::Transfer::new(controller);
-        let mut values = vec![Vec::with_capacity(self.nodes.len()); terms.len()];
+        let mut values = vec![Vec::with_capacity(self.nodes.len()); self.transfers().count()];
         for node in &self.nodes {
             let gain = transfer.gain(node.frequency).ok()?;
             let closed = ClosedLoop::new(&gain, &node.plant, &self.tuning.references)?;
-            for (at, term) in terms.iter().enumerate() {
-                let x = closed.transfer(term.transfer);
+            for (at, transfer) in self.transfers().enumerate() {
+                let x = closed.transfer(transfer, node.deviation.as_ref())?;
                 values[at].push(node.weights[at] * norm(&x)?);
             }
         }
@@ -113,15 +126,16 @@ impl<'a> Grid<'a> {
     ///
     /// d Re(u* X v) = Re(l dK r), l = u* `S_i`, and r = G `S_i` v at the commands,
     /// l = u* `S_o` G, r = `S_o` v at the measurements, l = u* `S_i`, r = `S_o` v for K S. For the tracking error
-    /// l = -u* H G `S_i`, r = [G `S_i` `K_r` v; v], with d[K, `K_r`] in place of dK; T has the opposite sign of S.
+    /// l = -u* H G `S_i`, r = [G `S_i` `K_r` v; v], with d[K, `K_r`] in place of dK; T has the opposite sign of S. For
+    /// the deviation by delays, D, l = u* `S_i`, r = `S_o` D v.
     pub(super) fn cuts(
         &self,
         controller: &StateSpace,
         differences: &[StateSpace],
         place: Place,
     ) -> Option<Vec<Cut>> {
-        let Node { frequency, plant, weights } = &self.nodes[place.node];
-        let (weight, transfer) = (weights[place.term], self.tuning.terms[place.term].transfer);
+        let Node { frequency, plant, deviation, weights } = &self.nodes[place.node];
+        let (weight, transfer) = (weights[place.term], self.transfers().nth(place.term)?);
         let (order, s) = (controller.a.nrows(), controller.domain.point(*frequency));
         let pencil = ComplexMatrix::identity(order, order) * s - to_complex(&controller.a);
         let (b, c) = (to_complex(&controller.b), to_complex(&controller.c));
@@ -129,19 +143,24 @@ impl<'a> Grid<'a> {
         let k = &c * forward.solve(&b)? + to_complex(&controller.d);
         let (t, p) = self.tuning.references.shape();
         let closed = ClosedLoop::new(&k, plant, &self.tuning.references)?;
-        let value = closed.transfer(transfer);
-        let sign = if matches!(transfer, Transfer::Complementary(_)) { -1.0 } else { 1.0 };
+        let value = closed.transfer(transfer, deviation.as_ref())?;
+        let sign = if matches!(transfer, Some(Transfer::Complementary(_))) { -1.0 } else { 1.0 };
         let real = |row: &ComplexMatrix, column: &ComplexMatrix| (column * row).map(|one| one.re);
         let cut = |(u, v): &(ComplexMatrix, ComplexMatrix)| {
+            use Transfer::{Complementary, Effort, Sensitivity, Tracking};
             let (left, right) = match transfer {
-                Transfer::Sensitivity(Point::Input) | Transfer::Complementary(Point::Input) => {
+                Some(Sensitivity(Point::Input) | Complementary(Point::Input)) => {
                     (u.adjoint() * &closed.at_input, plant * &closed.at_input * v)
                 }
-                Transfer::Sensitivity(Point::Output) | Transfer::Complementary(Point::Output) => {
+                Some(Sensitivity(Point::Output) | Complementary(Point::Output)) => {
                     (u.adjoint() * &closed.at_output * plant, &closed.at_output * v)
                 }
-                Transfer::Effort => (u.adjoint() * &closed.at_input, &closed.at_output * v),
-                Transfer::Tracking => {
+                Some(Effort) => (u.adjoint() * &closed.at_input, &closed.at_output * v),
+                None => {
+                    let deviation = deviation.as_ref()?;
+                    (u.adjoint() * &closed.at_input, &closed.at_output * deviation * v)
+                }
+                Some(Tracking) => {
                     let left = -(u.adjoint() * &closed.h_g * &closed.at_input);
                     let measured = plant * &closed.at_input * &closed.k_r * v;
                     let mut right = measured.resize_vertically(p + t, Complex::from(0.0));
@@ -182,17 +201,22 @@ impl ClosedLoop {
         Some(Self { k, k_r, at_input, at_output, h_g })
     }
 
-    /// The transfer function X at the frequency.
-    fn transfer(&self, transfer: Transfer) -> ComplexMatrix {
+    /// The transfer function X at the frequency; K S times the `deviation` by delays if `transfer` is None.
+    fn transfer(
+        &self,
+        transfer: Option<Transfer>,
+        deviation: Option<&ComplexMatrix>,
+    ) -> Option<ComplexMatrix> {
         let complement = |s: &ComplexMatrix| ComplexMatrix::identity(s.nrows(), s.ncols()) - s;
-        match transfer {
+        let Some(transfer) = transfer else { return Some(&self.k * &self.at_output * deviation?) };
+        Some(match transfer {
             Transfer::Sensitivity(Point::Input) => self.at_input.clone(),
             Transfer::Sensitivity(Point::Output) => self.at_output.clone(),
             Transfer::Complementary(Point::Input) => complement(&self.at_input),
             Transfer::Complementary(Point::Output) => complement(&self.at_output),
             Transfer::Effort => &self.k * &self.at_output,
             Transfer::Tracking => complement(&(&self.h_g * &self.at_input * &self.k_r)),
-        }
+        })
     }
 }
 
@@ -239,6 +263,7 @@ fn pairs(x: &ComplexMatrix) -> Option<Vec<(ComplexMatrix, ComplexMatrix)>> {
 mod tests {
     use super::*;
     use crate::blocks::beside;
+    use crate::delay::Delays;
     use crate::tuning::Term;
     use crate::weight::Weight;
 
@@ -275,8 +300,13 @@ mod tests {
             ];
             let weight = Weight::lead_lag(2.0, 1.0, 0.5, 1)?;
             let term = |transfer| Term { transfer, weight: weight.clone() };
+            let is_continuous = domain == Domain::Continuous;
+            let inputs = if is_continuous { vec![0.3, 0.1] } else { vec![0.0; 2] };
+            let delays = Delays { inputs, outputs: vec![0.0; 2] };
             let tuning = Tuning {
+                undelayed: plant.clone(),
                 plant,
+                delays: &delays,
                 controller: &build,
                 references: DMatrix::from_row_slice(1, 2, &[0.8, -0.3]),
                 terms: transfers.map(term).to_vec(),
@@ -306,7 +336,8 @@ mod tests {
             let nominal = controller(&start, domain);
             let values = |k: &StateSpace| grid.values(k).ok_or(Error::Overflow { what: "S" });
             let node = 80;
-            for term in 0..transfers.len() {
+            assert_eq!(grid.transfers().count(), transfers.len() + usize::from(is_continuous));
+            for term in 0..grid.transfers().count() {
                 let place = Place { term, node };
                 let cuts = grid.cuts(&nominal, &differences, place).expect("a gradient");
                 let Cut { value, gradient } = &cuts[0];

@@ -62,6 +62,14 @@ struct Units {
     references: DMatrix<f64>,
 }
 
+impl Units {
+    /// A plant with D = 0 in these units.
+    fn scaled(&self, plant: &StateSpace) -> StateSpace {
+        let (b, c) = (&plant.b * &self.commands, &self.measurements * &plant.c);
+        StateSpace { b, c, ..plant.clone() }
+    }
+}
+
 impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
     /// Tunes the gains from the best of `starts`, pairs of feedback and observer, and returns the result with the
     /// lowest gamma. An error if no start can be examined.
@@ -95,6 +103,8 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
                 controller: &controller,
                 references: self.scaled_h(&units),
                 terms: terms.clone(),
+                delays: &self.model.linear.delays,
+                undelayed: units.scaled(&self.model.linear.undelayed),
                 instability: 0.0,
                 is_allowed: &is_allowed,
                 rate: self.shape.bandwidth,
@@ -104,7 +114,12 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             tuning.instability = decay * excess.min(0.0);
             if examine_only {
                 let peak = tuning.peak(initial)?;
-                return Ok(Tuned { parameters: initial.clone(), peak, limits: Vec::new() });
+                return Ok(Tuned {
+                    parameters: initial.clone(),
+                    peak,
+                    largest: peak.gamma,
+                    limits: Vec::new(),
+                });
             }
             tuning.tuned(initial, &self.joined(&sizes))
         };
@@ -120,9 +135,8 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         examined.truncate(TUNED);
         let tuned: Vec<_> = examined.par_iter().map(|(_, start)| tune(start, false)).collect();
         let tuned = tuned.into_iter().collect::<Result<Vec<_>, Error>>()?;
-        let best =
-            tuned.into_iter().min_by(|one, other| one.peak.gamma.total_cmp(&other.peak.gamma));
-        let Some(Tuned { parameters, peak, limits }) = best else {
+        let best = tuned.into_iter().min_by(|one, other| one.largest.total_cmp(&other.largest));
+        let Some(Tuned { parameters, peak, limits, .. }) = best else {
             return Err(refusal.unwrap_or(Error::Overflow { what: "the loop of each start" }));
         };
         let [feedback, observer] = self.divided(&parameters, &starts[0]);
@@ -249,8 +263,8 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             Domain::Continuous => plant,
             Domain::Sampled { period } => held_plant(&plant, period)?,
         };
-        let (b, c) = (&plant.b * &units.commands, &units.measurements * &plant.c);
-        Ok((units, StateSpace { b, c, ..plant }))
+        let plant = units.scaled(&plant);
+        Ok((units, plant))
     }
 
     /// Returns S and T at commands and measurements, K S if `effort` is stated, and the tracking error if references
