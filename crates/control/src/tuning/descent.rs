@@ -47,7 +47,7 @@ impl Tuning<'_> {
     /// gradients. After each of these searches the
     /// frequency of the verified peak is added to the grid. The result is a local minimum at best; gamma is verified.
     ///
-    /// With delays the search also counts sigma_max(S K (G - `G_a`)) / 0.1 at the commands, G with the delays
+    /// With delays the search also counts the norm of S K (G - `G_a`) / 0.1 at the commands, G with the delays
     /// themselves, `G_a` the plant of the search, and S with `G_a`. A search without it finds gains that are good for
     /// the approximation only. Where it is below 1, S with G is at most 1.12 times S with `G_a`.
     ///
