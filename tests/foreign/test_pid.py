@@ -132,6 +132,18 @@ def test_a_search_by_scipy_finds_no_better_gains_beside_those_of_the_design(aso_
     assert near.fun > 0.97 * gamma, (near.fun, gamma, near.x)
 
 
+@pytest.mark.parametrize("more", ["", "sample_time = 0.025\n"], ids=["continuous", "sampled"])
+def test_the_search_does_not_exploit_the_approximation_of_a_delay(aso_ftc, tmp_path, more):
+    """e^-s / (1 + 0.3 s): gains for the approximation alone had a peak of 36 with the delay itself."""
+    plant = 'A = [[-3.3333]]\nB = [[1]]\nC = [[3.3333]]\nactuators = [{ name = "u", delay = 1 }]\nactuator_faults = "all"\n'
+    shape = 'reference.track = ["y1"]\n[loop]\nbandwidth = 0.6166\nstructure = "PI"\n'
+    _, report, _ = designed(aso_ftc, tmp_path, plant + more + shape)
+    robustness = report["robustness"]
+    assert robustness["delays"]["difference"] < 0.2
+    approximated = max(point["s_peak"] for point in robustness["points"])
+    assert max(robustness["delays"]["s_peaks"]) < min(2.0, 1.02 * approximated)
+
+
 def simplex(count):
     return np.vstack([np.ones(count), np.ones((count, count)) + 0.05 * np.eye(count)])
 
