@@ -113,8 +113,8 @@ class System:
         self._folder = os.path.abspath(os.fspath(folder) if folder is not None else os.getcwd())
         config = {} if description is None else description
         if not isinstance(config, (str, Mapping)) or (isinstance(config, str) and os.path.isfile(config)):
-            found = f"the file {config}" if isinstance(config, str) else type(config).__name__
-            raise TypeError(f"expected the text of a system.toml or a dict, found {found}; System.from_toml reads files")
+            kind = f"the file {config}" if isinstance(config, str) else type(config).__name__
+            raise TypeError(f"expected the text of a system.toml or a dict, found {kind}; System.from_toml reads files")
         self._adopt(_core.check_configuration(config, self._folder))
         self._slaves: dict[str, Slave] = {}
         self._cache: tuple[dict[str, Any], dict[str, Slave], _core.Study] | None = None

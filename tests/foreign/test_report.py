@@ -192,8 +192,9 @@ def test_texts_and_values_that_are_not_finite_are_named(aso_ftc, write):
 
 def test_integers_that_doubles_cannot_hold_are_named(aso_ftc, write):
     results = pd.DataFrame({"time": [0.0, 1.0], "large": [2**53 + 1, 2**53 + 3], "small": [2**53 - 1, 0], "r": [1e300, 2.0]})
-    assert float(results["large"][0]) != results["large"][0] and float(results["small"][0]) == results["small"][0]
-    for name in ("own.csv", "own.parquet"):
+    large, small = (int(results[name][0]) for name in ("large", "small"))
+    assert int(float(large)) != large and int(float(small)) == small
+    for name in ("rows.csv", "columns.parquet"):
         page, _ = report(aso_ftc, write(name, results))
         (warning,) = page.xpath("//main//p[@class='outcome warned']")
         assert warning.text_content().endswith("not seen: large."), warning.text_content()
