@@ -30,7 +30,7 @@ const OF_SHAPE: [f64; 4] = [SLOWEST, 0.5, 2.0, FASTEST];
 const WEIGHT_POWER: i32 = -4;
 /// Largest number of states for which changed requirements are tried.
 const LARGEST_ORDER: usize = 24;
-/// Largest number of states for which gains by the shape of the loop are tried: for 8 they take some 10 s.
+/// Largest number of states for which gains by the shape of the loop are tried: for 8 they take some 20 s.
 const LARGEST_SHAPED: usize = 8;
 /// Part of the present peak of S below which a change must bring this peak to be proposed.
 const LOWER: f64 = 0.8;
