@@ -45,6 +45,14 @@ class Matrices:
         return a_0 - gain @ c_0 @ (a_0 if self.current else np.eye(len(a_0)))
 
 
+# The distillation column of S. Skogestad, M. Morari and J. C. Doyle, IEEE Trans. Autom. Control 33 (1988).
+COLUMN = """A = [[-0.0133333333, 0], [0, -0.0133333333]]
+B = [[0.0117066667, -0.01152], [0.0144266667, -0.0146133333]]
+C = [[1, 0], [0, 1]]
+actuator_faults = "all"
+"""
+
+
 def design_and_report(aso_ftc, folder, text):
     """The matrices of the design file for a plant file, and the report; None and the error if it is refused."""
     plant, file = folder / "plant.toml", folder / "design.toml"

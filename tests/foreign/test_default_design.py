@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from design_oracle import design_and_report
+from design_oracle import COLUMN, design_and_report
 
 # Published plants: the source, A, B, C, and the number of actuators whose faults the measurements can tell apart.
 PLANTS = {
@@ -318,14 +318,6 @@ def test_an_estimate_that_is_much_slower_than_the_feedback_is_a_warning_whose_re
     _, report = design_and_report(aso_ftc, tmp_path, AIRLINER.replace('"all"', '["rudder"]'))
     assert [fault["name"] for fault in report["plant"]["faults"]] == ["f_rudder"] and not report["warnings"]
     assert -max(pole[0] for pole in report["observer"]["eigenvalues"]) > 100 * slowest
-
-
-# The distillation column of S. Skogestad, M. Morari and J. C. Doyle, IEEE Trans. Autom. Control 33 (1988).
-COLUMN = """A = [[-0.0133333333, 0], [0, -0.0133333333]]
-B = [[0.0117066667, -0.01152], [0.0144266667, -0.0146133333]]
-C = [[1, 0], [0, 1]]
-actuator_faults = "all"
-"""
 
 
 def test_a_plant_that_no_bandwidth_makes_robust_keeps_the_speed_of_the_plant(aso_ftc, tmp_path):

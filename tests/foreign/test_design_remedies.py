@@ -2,7 +2,7 @@
 
 import pytest
 
-from design_oracle import design_and_report
+from design_oracle import COLUMN, design_and_report
 
 TROLLEY = """A = [[0, 1], [0, -1]]
 B = [[0], [1]]
@@ -188,14 +188,6 @@ def test_a_loop_that_is_not_stable_has_a_remedy_that_makes_it_green(aso_ftc, tmp
     assert other["verdict"]["level"] == "green"
     for point in other["robustness"]["points"]:
         assert f"{point['judged']:.3f}"[:4] in remedy["change"], remedy
-
-
-# The distillation column of S. Skogestad, M. Morari and J. C. Doyle, IEEE Trans. Autom. Control 33 (1988).
-COLUMN = """A = [[-0.0133333333, 0], [0, -0.0133333333]]
-B = [[0.0117066667, -0.01152], [0.0144266667, -0.0146133333]]
-C = [[1, 0], [0, 1]]
-actuator_faults = "all"
-"""
 
 
 def test_fewer_faults_make_a_plant_robust_whose_stationary_gain_is_nearly_singular(aso_ftc, tmp_path):
