@@ -44,12 +44,12 @@ impl Tuning<'_> {
     ///
     /// Method: steps of sequential quadratic programming for the maximum over the local maxima of a grid of
     /// frequencies, with a BFGS approximation of the Hessian of the Lagrangian that starts from the squares of the
-    /// gradients. After each of these searches the
-    /// frequency of the verified peak is added to the grid. The result is a local minimum at best; gamma is verified.
+    /// gradients. After each of these searches the frequency of the verified peak is added to the grid. The result is a
+    /// local minimum at best; gamma is verified.
     ///
-    /// With delays the search also counts the norm of S K (G - `G_a`) / 0.1 at the commands, G with the delays
-    /// themselves, `G_a` the plant of the search, and S with `G_a`. A search without it finds gains that are good for
-    /// the approximation only. Where it is below 1, S with G is at most 1.12 times S with `G_a`.
+    /// With delays the search also counts the norm of S K (G - `G_a`) / 0.1, G with the delays themselves, `G_a` the
+    /// plant of the search, and S with `G_a` at the commands. Without this, it finds gains that are good for the
+    /// approximation only. Where the value is v, S with G is at most 1 / (1 - 0.1 v) times as large as S with `G_a`.
     ///
     /// Source: P. Apkarian and D. Noll, Nonsmooth H-infinity synthesis, IEEE Trans. Autom. Control 51
     /// (2006); J. V. Burke, D. Henrion, A. S. Lewis and M. L. Overton, HIFOO (2006).

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 /// Number of frequencies per decade of the grid, which spans [`DECADES`] decades on each side of the bandwidth.
 const PER_DECADE: i32 = 30;
 const DECADES: i32 = 3;
-/// Largest singular value of S K times the deviation of the plant by its delays, with which gamma is 1.
+/// Largest singular value of S K times the error of the approximated delays that counts as the value 1.
 const DEVIATION: f64 = 0.1;
 /// The largest number of iterations for the eigenvalues of a Hermitian matrix.
 const ITERATIONS: usize = 1000;
@@ -27,7 +27,7 @@ pub(super) struct Grid<'a> {
 struct Node {
     frequency: f64,
     plant: ComplexMatrix,
-    /// The plant with the delays themselves less `plant`; None without delays.
+    /// The error of the approximated delays: the plant with the delays themselves less `plant`; None without delays.
     deviation: Option<ComplexMatrix>,
     /// The magnitude of the weight of each term, then that of the deviation by delays.
     weights: Vec<f64>,

@@ -23,7 +23,7 @@ use plant_file::signals::Signal;
 const FACTORS: [f64; 8] = [SLOWEST, 0.4, 0.6, 0.8, 1.25, 1.7, 2.5, FASTEST];
 const SLOWEST: f64 = 0.25;
 const FASTEST: f64 = 4.0;
-/// The same for the shape of the loop, which takes longer.
+/// Factors on the bandwidth of the shape of a loop: few, as each of these designs takes long.
 const OF_SHAPE: [f64; 4] = [SLOWEST, 0.5, 2.0, FASTEST];
 /// Exponent with which a weight of commands or measurements changes with the factor on the speed, as for a double
 /// integrator.
@@ -103,8 +103,8 @@ pub(crate) fn remedies(
         let shaped = budget.run(|| shaped(file, varies));
         trials.extend(shaped.filter(|_| !budget.is_over()));
     }
-    let is_aim = |reason: &Reason| matches!(reason.aim, Aim::Stable);
-    if reasons.iter().any(is_aim) && trials.iter().all(|trial| trial.judged.is_unstable) {
+    let is_of_tolerances = |reason: &Reason| matches!(reason.aim, Aim::Stable);
+    if reasons.iter().any(is_of_tolerances) && trials.iter().all(|trial| trial.judged.is_unstable) {
         trials.extend(with_fewer_faults(file, varies, budget));
     }
     let remedy = |reason: Reason| reason.remedy(&trials, is_complete, &present, limits);
@@ -161,7 +161,7 @@ fn shaped(file: &PlantFile<'_>, varies: bool) -> Option<Trial> {
 }
 
 /// Designs the file without each of its faults, if there are several, all of actuators and with no entry that refers to
-/// them; None where there is no design. As the estimates of faults act as integrals, no loop with as many of them as
+/// them; without a trial where there is no design. As the estimates of faults act as integrals, no loop with as many of them as
 /// measurements is stable beyond a plant whose stationary gains are singular.
 fn with_fewer_faults(file: &PlantFile<'_>, varies: bool, budget: &Budget) -> Vec<Trial> {
     let actuator = |fault: &Fault| match fault.entry_point {
