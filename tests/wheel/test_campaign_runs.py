@@ -201,6 +201,37 @@ def test_ctrl_c_on_a_terminal_ends_in_one_sentence(campaign, tmp_path):
     assert process.returncode == 130
 
 
+# Sends Ctrl-C while a task is half made, and while it is released.
+INTERRUPTED = """
+import signal, sys
+import distributed
+from aso_ftc.campaign._command import main
+
+if __name__ == "__main__":
+    moment, future = sys.argv.pop(1), distributed.Future
+    method = getattr(future, moment)
+
+    def interrupted(self, *words, **options):
+        if str((*words, getattr(self, "key", ""))[0]).startswith("aso-ftc-"):
+            setattr(future, moment, method)
+            signal.raise_signal(signal.SIGINT)
+        return method(self, *words, **options)
+
+    setattr(future, moment, interrupted)
+    sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize("moment", ["__init__", "release"])
+def test_ctrl_c_within_a_call_of_dask_ends_in_one_sentence(campaign, tmp_path, moment):
+    program = tmp_path / "interrupted.py"
+    program.write_text(INTERRUPTED, encoding="utf-8")
+    line = [sys.executable, "-I", program, moment, campaign(), "--out", tmp_path / "out", "--workers", "1"]
+    process = subprocess.run(line, capture_output=True, text=True, timeout=120)
+    assert process.stderr == "error: interrupted; the same command goes on where it stopped\n"
+    assert process.returncode == 130
+
+
 def test_rows_stay_the_same_if_worker_client_and_scheduler_are_killed(campaign, tmp_path, cluster):
     file, folder = campaign(runs=120, stop=2.0), tmp_path / "out"
     words = (file, "--out", folder, "--scheduler", cluster.address)

@@ -11,6 +11,7 @@ import pickle
 import signal
 import sys
 import tempfile
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -223,6 +224,27 @@ def _without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
+@contextlib.contextmanager
+def _deferred_interrupt() -> Iterator[None]:
+    """Let Ctrl-C count at the end of the block.
+
+    In the middle of a call it may leave a task of Dask half made or half released, which prints a traceback when
+    it is deleted.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    deferred: list[tuple[int, Any]] = []
+    signal.signal(signal.SIGINT, lambda *call: deferred.append(call))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    if deferred:
+        handler(*deferred[0])
+
+
 class _Plugin:
     """Keeps the job of a campaign on each worker, also on those that join later.
 
@@ -307,9 +329,10 @@ class _Tasks:
     def submit(self, numbers: list[int]) -> None:
         """Hand runs to the cluster as one task."""
         key = f"{self.name}-{numbers[0]}-{len(numbers)}-{time.monotonic_ns()}"
-        future = self.client.submit(_do, self.name, *self.work(numbers), pure=False, key=key)
-        self._futures[future] = numbers
-        self._waiting.add(future)
+        with _deferred_interrupt():
+            future = self.client.submit(_do, self.name, *self.work(numbers), pure=False, key=key)
+            self._futures[future] = numbers
+            self._waiting.add(future)
 
     def next(self, attend: Callable[[], None]) -> tuple[list[int], Any]:
         """Wait for a task; return its runs and its rows, its exception, or ``None`` if it was lost."""
@@ -317,10 +340,11 @@ class _Tasks:
             self._look()
             attend()
             time.sleep(_PAUSE)
-        future, result = next(self._waiting)
-        numbers = self._futures.pop(future)
-        status = future.status
-        future.release()
+        with _deferred_interrupt():
+            future, result = next(self._waiting)
+            numbers, status = self._futures.pop(future), future.status
+            future.release()
+            del future
         if status == "error":
             return numbers, result[1]
         if not isinstance(result, list):
@@ -422,9 +446,11 @@ class _Work:
             # A worker left while it got the job. The scheduler has it for the others, which may still be getting it.
             if client.status != "running":
                 raise
-        try:
+        with _deferred_interrupt():
             # An adaptive cluster starts its first worker for a task.
-            client.submit(int, pure=False).result(timeout=_PATIENCE)
+            first = client.submit(int, pure=False)
+        try:
+            first.result(timeout=_PATIENCE)
         except TimeoutError:
             raise Error(
                 f"the scheduler has no workers within {_PATIENCE:g} s: start some", "Scheduler"
