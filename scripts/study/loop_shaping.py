@@ -2,8 +2,8 @@
 
     python scripts/study/loop_shaping.py
 
-Both designs have the same weights of S and T, `bandwidth` of the table below and `peak` 1.5. mixsyn minimises the norm of
-[W1 S; W2 K S; W3 T] at the measurements with a small W2, and its controller has the order of plant and weights together. The
+Both designs have the same weights of S, T and K S, `bandwidth` of the table below and `peak` 1.5. mixsyn minimises the norm of
+[W1 S; W2 K S; W3 T] at the measurements, and its controller has the order of plant and weights together. The
 third controller is that of D. McFarlane and K. Glover, IEEE Trans. Autom. Control 37 (1992), for the plant with an integrator
 at each command and the loop gain 1 at the bandwidth, within 10 % of the largest margin; its equations are those of
 S. Skogestad and I. Postlethwaite, Multivariable Feedback Control, 2nd edition, (9.65) to (9.70).
@@ -21,7 +21,7 @@ from scipy.linalg import solve_continuous_are
 
 from command import ROOT, design
 
-PEAK, FLOOR, ROLL_OFF, EFFORT = 1.5, 0.01, 10.0, 1e-3
+PEAK, FLOOR, ROLL_OFF, EFFORT = 1.5, 0.01, 10.0, 100.0
 # The integrators of the shaped plant act below the bandwidth by this factor.
 SLOWER = 5.0
 
@@ -77,6 +77,13 @@ def weights(bandwidth):
     of_s = (s / PEAK + bandwidth) / (s + FLOOR * bandwidth)
     of_t = (s / corner + 1) / (s * FLOOR / corner + 1) / PEAK
     return of_s, of_t
+
+
+def effort(plant, bandwidth):
+    """The default of `effort`, without units of its own."""
+    speeds = [abs(pole) for pole in plant.poles() if pole.real > 0]
+    frequencies = [FLOOR * bandwidth, bandwidth, *(2.0 * speed for speed in speeds)]
+    return max(EFFORT / np.linalg.svd(plant(1j * w, squeeze=False), compute_uv=False)[-1] for w in frequencies)
 
 
 def tuned(a, b, c, bandwidth):
@@ -141,7 +148,7 @@ def main():
         of_s, of_t = weights(bandwidth)
         # mixsyn has no integrators; eigenvalues on the imaginary axis move a little.
         shifted = control.ss(a - 1e-4 * bandwidth * np.eye(len(a)), b, c, plant.D)
-        theirs, *_ = control.mixsyn(shifted, of_s, control.tf([EFFORT], [1]), of_t)
+        theirs, *_ = control.mixsyn(shifted, of_s, control.tf([1.0 / effort(plant, bandwidth)], [1]), of_t)
         other = figures(plant, -theirs, bandwidth)
         robust, margin = by_coprime_factors(plant, bandwidth)
         third = figures(plant, robust, bandwidth)

@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 
-PEAK, FLOOR, ROLL_OFF = 1.5, 0.01, 10.0
+PEAK, FLOOR, ROLL_OFF, EFFORT = 1.5, 0.01, 10.0, 100.0
 PLANTS = {
     "double integrator with friction": ([[0, 1], [0, -0.5]], [[0], [0.5]], [[1, 0]], 0.5),
     "unstable": ([[0, 1], [1, 0]], [[0], [1]], [[1, 0]], 1.0),
@@ -27,10 +27,19 @@ def designed(aso_ftc, folder, plant, more=""):
     return tomllib.loads((folder / "design.toml").read_text()), report, float(stated[1])
 
 
+def default_effort(a, b, c, bandwidth):
+    """EFFORT times the largest inverse gain at the ends of the bandwidth and at twice the speed of unstable modes."""
+    speeds = [abs(pole) for pole in np.linalg.eigvals(a) if pole.real > 0]
+    frequencies = [FLOOR * bandwidth, bandwidth, *(2 * speed for speed in speeds)]
+    gains = [c @ np.linalg.solve(1j * w * np.eye(len(a)) - a, b) for w in frequencies]
+    return max(EFFORT / np.linalg.svd(gain, compute_uv=False)[-1] for gain in gains)
+
+
 def weighted(design, plant, omega):
-    """The largest of |W1 S| and |W3 T| at the commands and the measurements."""
+    """The largest of |W1 S| and |W3 T| at the commands and the measurements, and of |W2 K S|."""
     a, b, c = (np.array(one, float) for one in plant[:3])
     bandwidth, (n, m) = plant[3], b.shape
+    effort = default_effort(a, b, c, bandwidth)
     k_x, l_x, l_f = (np.array(design[key], float) for key in ("K_x", "L_x", "L_f"))
     a_0 = np.block([[a, b], [np.zeros((m, n + m))]])
     b_0 = np.vstack([b, np.zeros((m, m))])
@@ -50,6 +59,7 @@ def weighted(design, plant, omega):
             sensitivity = np.linalg.inv(unit - opened)
             largest = max(largest, of_s * np.linalg.norm(sensitivity, 2))
             largest = max(largest, of_t * np.linalg.norm(unit - sensitivity, 2))
+        largest = max(largest, np.linalg.norm(k @ sensitivity, 2) / effort)
     return largest
 
 

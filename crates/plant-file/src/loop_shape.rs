@@ -39,7 +39,7 @@ pub struct LoopShape {
     pub peak: f64,
     /// |T| is below `peak` x `roll_off` / w at frequencies w above `roll_off`, both in rad/s.
     pub roll_off: f64,
-    /// |K S| is below `effort` at every frequency; `None` without this requirement.
+    /// |K S| is below `effort` at every frequency; `None` for the default.
     pub effort: Option<f64>,
     /// PI, PID or other controllers of low order in place of the state feedback, if stated.
     pub pid: Option<Pid>,

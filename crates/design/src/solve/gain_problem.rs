@@ -116,14 +116,14 @@ impl GainProblem<'_> {
         filter: Option<&[f64]>,
         gains: impl Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync,
     ) -> Result<(GainResult, GainResult, Option<PlaceError>), crate::Error> {
-        let Self { file, linear, plant, domain, .. } = *self;
+        let Self { file, linear, plant, pair, domain, .. } = *self;
         let model = LoopModel { linear, plant, filter, domain };
         if let Some(shape) = &file.loop_shape {
             let Search { starts, free } = self.search(shape)?;
             let references =
                 file.references.as_ref().filter(|one| one.integral && !one.feedforward);
             let red = file.robustness.red;
-            let problem = LoopProblem { shape, model, references, red, free, gains };
+            let problem = LoopProblem { shape, model, pair, references, red, free, gains };
             let ShapedGains { feedback, observer, warning } = problem.tuned(&starts)?;
             return Ok((feedback, observer, warning.map(|text| file.error_at(&shape.place, text))));
         }

@@ -4,6 +4,7 @@ use control::aso::Gains;
 use control::bandwidth::NaturalUnits;
 use control::controller::complete_controller;
 use control::faults::FaultEntry;
+use control::response::frequency_response;
 use control::robustness::{Point, held_plant};
 use control::stability::instability;
 use control::tuning::{Term, Transfer, Tuned, Tuning, WeightedPeak};
@@ -12,6 +13,7 @@ use control::{Domain, Error, StateSpace, lmi};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::plant::attainable::rates;
 use crate::plant::linear::LinearPlant;
 use crate::report::number::rounded;
 use crate::solve::gain::{GainResult, unique};
@@ -31,6 +33,11 @@ const DECAY_OF_INTEGRALS: f64 = 0.9;
 const DECAY_OF_ESTIMATES: f64 = 0.5;
 /// Smallest scale of an entry of a gain in the search, relative to the average of its row and its column.
 const SMALLEST: f64 = 0.1;
+/// Default of `effort`, relative to the inverse gain of the plant.
+const EFFORT: f64 = 100.0;
+/// Bandwidth that an unstable mode needs at least, relative to its speed (S. Skogestad, I. Postlethwaite, Multivariable
+/// Feedback Control, 2nd edition, Wiley 2005, section 5.9).
+const FASTER: f64 = 2.0;
 /// Largest frequency at which the roll-off is required, relative to half the sampling rate.
 const BELOW_NYQUIST: f64 = 0.8;
 
@@ -38,6 +45,8 @@ const BELOW_NYQUIST: f64 = 0.8;
 pub(crate) struct LoopProblem<'a, G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> {
     pub(crate) shape: &'a LoopShape,
     pub(crate) model: LoopModel<'a>,
+    /// A and B of the feedback.
+    pub(crate) pair: &'a (DMatrix<f64>, DMatrix<f64>),
     /// References that are integrated and do not act on the commands directly.
     pub(crate) references: Option<&'a References>,
     /// The peak of S above which the verdict is red.
@@ -77,7 +86,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let (units, plant) = self.scaled_plant()?;
         let ending = lmi::ending();
         let is_over = || ending.as_ref().is_some_and(|ending| ending());
-        let terms = self.terms()?;
+        let terms = self.terms(self.effort(&plant)?)?;
         let [feedback, observer] = &starts[0];
         let has_integrals = (self.gains)(feedback, observer).integral.is_some();
         let decay =
@@ -88,14 +97,13 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
                 let [feedback, observer] = self.divided(parameters, start);
                 self.controller(&units, &feedback, &observer)
             };
-            let error_instability = |[feedback, observer]: &[DMatrix<f64>; 2]| {
-                let gains = (self.gains)(feedback, observer);
-                instability(&gains.error_dynamics(self.model.plant), self.model.domain)
-            };
-            let slowest = DECAY_OF_ESTIMATES * error_instability(start)?;
+            let of_estimates = if has_integrals { DECAY_OF_ESTIMATES } else { DECAY };
+            let [of_errors, of_feedback] = self.excesses(has_integrals, start)?;
+            let most = |decay, excess| if excess < 0.0 { decay * excess } else { f64::INFINITY };
+            let most = [most(of_estimates, of_errors), most(DECAY, of_feedback)];
             let is_allowed = |parameters: &DVector<f64>| {
-                let decays = |excess: Result<f64, Error>| excess.is_ok_and(|one| one <= slowest);
-                !has_integrals || decays(error_instability(&self.divided(parameters, start)))
+                let excesses = self.excesses(has_integrals, &self.divided(parameters, start));
+                excesses.is_ok_and(|all| all.iter().zip(&most).all(|(one, most)| one <= most))
             };
             let initial = &self.joined(start);
             let mut tuning = Tuning {
@@ -267,10 +275,53 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         Ok((units, plant))
     }
 
-    /// Returns S and T at commands and measurements, K S if `effort` is stated, and the tracking error if references
+    /// Returns the limit of K S. Unless it is stated: [`EFFORT`] times the largest inverse singular value of `plant` at
+    /// the two ends of the range in which |S| is small, and at [`FASTER`] times the speed of each unstable mode, because
+    /// such a loop has a K S of about that size. Infinite if the commands cannot move the measurements in every
+    /// direction, and for PI and PID controllers, whose filters limit K S.
+    fn effort(&self, plant: &StateSpace) -> Result<f64, Error> {
+        let (bandwidth, speeds) = match *self.shape {
+            LoopShape { effort: Some(effort), .. } => return Ok(effort),
+            LoopShape { pid: Some(_), .. } => return Ok(f64::INFINITY),
+            LoopShape { bandwidth, .. } => (bandwidth, rates(&plant.a, plant.domain)?),
+        };
+        let unstable = speeds.iter().filter(|rate| rate.re > 0.0).map(|rate| FASTER * rate.norm());
+        let mut effort: f64 = 0.0;
+        for frequency in unstable.chain([FLOOR * bandwidth, bandwidth]) {
+            let least = match frequency_response(plant, &[frequency]) {
+                Ok(points) => points[0].singular_values.last().copied().unwrap_or(f64::INFINITY),
+                // An undamped mode needs no command.
+                Err(Error::Overflow { .. }) => f64::INFINITY,
+                Err(error) => return Err(error),
+            };
+            effort = effort.max(EFFORT / least);
+        }
+        Ok(effort)
+    }
+
+    /// Returns the instabilities of estimation error and state feedback that the search limits beside that of the loop.
+    /// They are eigenvalues of the loop, unless it has a better approximation of the delays; -infinity for one that
+    /// needs no limit.
+    fn excesses(
+        &self,
+        has_integrals: bool,
+        [feedback, observer]: &[DMatrix<f64>; 2],
+    ) -> Result<[f64; 2], Error> {
+        let LoopModel { linear, plant, domain, .. } = self.model;
+        let (has_delays, (a, b)) = (linear.delays.any(), self.pair);
+        let of_errors = || (self.gains)(feedback, observer).error_dynamics(plant);
+        let of_errors = (has_integrals || has_delays).then(of_errors);
+        let of_feedback = has_delays.then(|| a + b * feedback);
+        let excess = |dynamics: Option<DMatrix<f64>>| {
+            dynamics.map_or(Ok(f64::NEG_INFINITY), |one| instability(&one, domain))
+        };
+        Ok([excess(of_errors)?, excess(of_feedback)?])
+    }
+
+    /// Returns S and T at commands and measurements, K S if `effort` is finite, and the tracking error if references
     /// are integrated, with their weights.
-    fn terms(&self) -> Result<Vec<Term>, Error> {
-        let LoopShape { bandwidth, set_point, peak, roll_off, effort, .. } = *self.shape;
+    fn terms(&self, effort: f64) -> Result<Vec<Term>, Error> {
+        let LoopShape { bandwidth, set_point, peak, roll_off, .. } = *self.shape;
         let LinearPlant { actuators, measurements, models, .. } = self.model.linear;
         let (m, p) = (actuators.len(), measurements.len());
         let integrals =
@@ -298,7 +349,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             terms.push(Term { transfer: Transfer::Sensitivity(point), weight });
             terms.push(Term { transfer: Transfer::Complementary(point), weight: falling.clone() });
         }
-        if let Some(effort) = effort {
+        if effort.is_finite() && effort > 0.0 {
             let weight = Weight::constant(1.0 / effort);
             terms.push(Term { transfer: Transfer::Effort, weight });
         }
