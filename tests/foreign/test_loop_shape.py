@@ -6,6 +6,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 PEAK, FLOOR, ROLL_OFF, EFFORT = 1.5, 0.01, 10.0, 100.0
 PLANTS = {
@@ -70,6 +71,34 @@ def test_gamma_is_the_largest_weighted_peak_and_all_that_is_asked_for_is_met(aso
     largest = weighted(design, plant, plant[3] * np.logspace(-4, 4, 3000))
     assert gamma == pytest.approx(largest, rel=2e-3)
     assert gamma <= 1.0
+
+
+def test_a_loop_that_no_exchange_of_signals_can_follow_is_amber(aso_ftc, tmp_path):
+    plant = ([[-1, 0, 0], [1, -1, 0], [0, 1, -1]], [[1], [0], [0]], [[0, 0, 1]], 1.0)
+    _, report, _ = designed(aso_ftc, tmp_path, plant)
+    assert report["verdict"]["level"] == "green"
+    assert report["robustness"]["longest_hold"] > 0.01 * report["robustness"]["delay_margin"]
+    (tmp_path / "effort").mkdir()
+    design, report, gamma = designed(aso_ftc, tmp_path / "effort", (*plant[:3], "1.0\neffort = 1e5"))
+    assert gamma <= 1 and report["verdict"]["level"] == "amber"
+    assert "may hold their signals for" in report["verdict"]["reasons"][0]
+    # The loop with held signals, by matrix exponentials.
+    a, b, c = (np.array(one, float) for one in plant[:3])
+    k_x, l_x, l_f = (np.array(design[key], float) for key in ("K_x", "L_x", "L_f"))
+    gain = np.hstack([k_x, [[-1.0]]])
+    a_k = np.block([[a + b @ k_x - l_x @ c, np.zeros((3, 1))], [-l_f @ c, np.zeros((1, 1))]])
+
+    def radius(hold):
+        def held(a, b):
+            n, m = b.shape
+            whole = expm(hold * np.block([[a, b], [np.zeros((m, n + m))]]))
+            return whole[:n, :n], whole[:n, n:]
+
+        (phi, gamma), (phi_k, gamma_k) = held(a, b), held(a_k, np.vstack([l_x, l_f]))
+        return max(abs(np.linalg.eigvals(np.block([[phi, gamma @ gain], [gamma_k @ c, phi_k]]))))
+
+    longest = report["robustness"]["longest_hold"]
+    assert radius(0.97 * longest) < 1 < radius(1.03 * longest)
 
 
 def test_a_sampled_loop_meets_the_peak_that_it_is_tuned_for(aso_ftc, tmp_path):

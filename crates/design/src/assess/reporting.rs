@@ -25,7 +25,7 @@ use crate::assess::reconfiguration::reasons as reconfiguration_reasons;
 use crate::assess::references::{beyond_limits, reached, reference_steps};
 use crate::assess::remedies::remedies;
 use crate::assess::responses::responses;
-use crate::assess::robustness::{delay_reasons, robustness};
+use crate::assess::robustness::{delay_reasons, hold_reason, robustness};
 use crate::assess::schedule::{self as schedule_report, judge_schedule};
 use crate::assess::slow_estimates;
 use crate::assess::verdict::verdict;
@@ -113,6 +113,7 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
     let of_losses = losses.iter().flat_map(losses::reasons);
     let further = of_losses.chain(reconfiguration.iter().flat_map(reconfiguration_reasons));
     let mut further: Vec<_> = further.chain(robustness.iter().flat_map(delay_reasons)).collect();
+    further.extend(robustness.as_ref().and_then(|figures| hold_reason(nominal, figures)));
     let (responses, frequency) =
         rayon::join(|| steps.run(Step::Responses, || responses(nominal)), || loops.frequency());
     let responses = unless_numerical("the responses to faults", responses, &mut missing)?;

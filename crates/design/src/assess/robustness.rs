@@ -27,8 +27,9 @@ use crate::budget::{Budget, TimeLimits};
 use crate::plant::linear::LinearPlant;
 use crate::plant::parameters::ParameterFamily;
 use crate::progress::{Step, Steps};
+use crate::report::number::rounded;
 use crate::report::robustness::{
-    Channel, Compared, Disk, LoopPoint, Number, PeakSensitivity, Robustness,
+    Channel, Compared, Disk, Level, LoopPoint, Number, PeakSensitivity, Robustness,
 };
 use crate::report::{Frequency, Matrix};
 use crate::solve::solution::{Solution, looped};
@@ -38,6 +39,9 @@ use plant_file::signals::{Signal, same_unit};
 const WIDTH: f64 = 1e-4;
 const POINTS_PER_DECADE: u32 = 20;
 const POINTS: [(Point, &str); 2] = [(Point::Input, "input"), (Point::Output, "output")];
+
+/// A longest hold below this part of the delay margin is a reason of the verdict.
+const SHORT_HOLD: f64 = 0.01;
 
 /// Returns the loop of a design: the plant, and the controller with its filter and its integrals.
 pub(crate) fn loop_of(designed: &Solution) -> Result<Loop, Error> {
@@ -96,6 +100,22 @@ pub(crate) fn robustness(
         noise_together,
     };
     Ok((Some(robustness), budget))
+}
+
+/// Returns the reason that a short hold adds to the verdict on a continuous design: the delay margin does not see what
+/// held signals do to the fast modes of a controller.
+pub(crate) fn hold_reason(designed: &Solution, robustness: &Robustness) -> Option<(Level, String)> {
+    let Robustness { longest_hold: hold, delay_margin: delay, .. } = *robustness;
+    let is_short = designed.domain == Domain::Continuous && hold < SHORT_HOLD * delay;
+    (is_short && delay.is_finite()).then(|| {
+        let (hold, delay) = (rounded(hold), rounded(delay));
+        let help = "a slower observer, a lower `effort` of `[loop]` or a `sample_time` helps";
+        let text = format!(
+            "plant and controller may hold their signals for {hold} s at most, although the delay margin is {delay} s: \
+             the controller is much faster than its loop; {help}"
+        );
+        (Level::Amber, text)
+    })
 }
 
 /// The margins of a loop, and the effect of measurement noise in it.
