@@ -21,7 +21,8 @@ pub(super) fn bounds(report: &Report) -> Markup {
              fault times its " code { "bound" } " in the plant file. A constant fault that has a "
             code { "rate_bound" } ", too, has a smaller one if the gain of its rate times "
             code { "rate_bound" } ", with what the commands leave of the fault, is less; without "
-            code { "bound" } ", if they leave nothing."
+            code { "bound" } ", if they leave nothing. A bound by the rate does not hold for a sudden \
+             change, such as " code { "step" } ", whose largest errors the responses show."
         }
         (table_of("Largest values", &report.bounds, &columns))
     }

@@ -423,7 +423,8 @@ pub struct Bound {
     #[schemars(with = "Option<f64>")]
     pub gain_of_rate: f64,
     /// The bound of the error by the bound of the fault or, if it is smaller, by that of its rate; none if the file
-    /// states neither, or `rate_bound` alone and the commands leave a part of the fault.
+    /// states neither, or `rate_bound` alone and the commands leave a part of the fault. That of the rate does not hold
+    /// for a sudden change of the fault.
     pub largest: Option<f64>,
 }
 
