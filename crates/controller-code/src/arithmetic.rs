@@ -178,7 +178,7 @@ fn take_sample(controller: &Controller) {
     signals.limit(&design, &[]);
     signals.predict(&design, &state, true);
     if let Some(detection) = &controller.detection {
-        let (k, rows) = (detection.a.nrows(), detection.c.nrows());
+        let [k, rows] = [Kind::ResidualState, Kind::Residual].map(|kind| kind.count(controller));
         let (mut next, mut residuals) = (vec![Counted; k], vec![Counted; rows]);
         let inputs: [&[_]; 3] = [&vec![Counted; k], signals.u, signals.y];
         numbers.filter_of_residuals().advance(inputs, false, &mut next, &mut residuals);

@@ -5,11 +5,12 @@ use aso_controller::design::{Estimator, Loss, SlidingMode};
 use nalgebra::DMatrix;
 
 use super::Precision;
-use super::detection::Detection;
-use super::parts::{Signal, dense, first_at};
+use super::detection::{self, Detection};
+use super::parts::{Signal, first_at};
 use super::reconfiguration::Reconfiguration;
 use super::schedule::Schedule;
 use super::symbols::Matrix;
+use super::values::Matrices;
 use crate::Error;
 
 /// The controller of a sampled design: matrices, signals, switches. The shapes are those of the design file.
@@ -25,28 +26,9 @@ pub(super) struct Controller {
     pub(super) monitor: bool,
     /// The diagonal of W, the weights of the filter of the measurements.
     pub(super) filter: Option<Vec<f64>>,
-    pub(super) a: DMatrix<f64>,
-    pub(super) b: DMatrix<f64>,
-    pub(super) c: DMatrix<f64>,
-    /// D, the direct term of the commands in the measurements, if there is one.
-    pub(super) d: Option<DMatrix<f64>>,
-    pub(super) f_a: DMatrix<f64>,
-    /// `A_f`; the identity if faults are constant.
-    pub(super) a_f: DMatrix<f64>,
-    pub(super) constant_faults: bool,
-    pub(super) k_x: DMatrix<f64>,
-    pub(super) k_f: DMatrix<f64>,
-    pub(super) l_x: DMatrix<f64>,
-    pub(super) l_f: DMatrix<f64>,
-    /// The direct term of the estimated faults, where the law has one.
-    pub(super) p_f: Option<DMatrix<f64>>,
+    /// The matrices that the design states; without `A_f` the faults are constant.
+    pub(super) matrices: Matrices,
     pub(super) sliding_mode: Option<SlidingMode>,
-    /// H, `K_i`, `F_i`, `L_w`, `N_r` of the references, where the design states them.
-    pub(super) h: Option<DMatrix<f64>>,
-    pub(super) k_i: Option<DMatrix<f64>>,
-    pub(super) f_i: Option<DMatrix<f64>>,
-    pub(super) l_w: Option<DMatrix<f64>>,
-    pub(super) n_r: Option<DMatrix<f64>>,
     /// The fraction of `u_t` that decays in one sample.
     pub(super) transfer: Option<f64>,
     pub(super) states: Vec<Signal>,
@@ -74,6 +56,8 @@ impl Controller {
         };
         let losses = file.losses();
         let reconfiguration = Reconfiguration::of(&file, &losses, sample_time);
+        let of_detection = file.detection.iter().flat_map(detection::matrices);
+        let matrices = Matrices::of(file.matrices().chain(of_detection));
         // Each entry of a design file is read here or above, or has the reason why it needs no code.
         let Design {
             description,
@@ -82,23 +66,23 @@ impl Controller {
             sample_time: _,
             estimator: _,
             filter,
-            a,
-            b,
-            c,
-            d,
-            f_a,
-            a_f,
-            p_f,
+            a: _,
+            b: _,
+            c: _,
+            d: _,
+            f_a: _,
+            a_f: _,
+            p_f: _,
             sliding_mode,
-            k_x,
-            k_f,
-            l_x,
-            l_f,
-            h,
-            k_i,
-            f_i,
-            l_w,
-            n_r,
+            k_x: _,
+            k_f: _,
+            l_x: _,
+            l_f: _,
+            h: _,
+            k_i: _,
+            f_i: _,
+            l_w: _,
+            n_r: _,
             transfer,
             states,
             actuators,
@@ -117,8 +101,6 @@ impl Controller {
         let detection =
             detection.map(|detection| Detection::of(detection, sample_time)).transpose()?;
         let schedule = schedule.map(|schedule| Schedule::of(schedule, &measurements));
-        let stated = |matrix: Option<aso_controller::Matrix>| matrix.as_ref().map(dense);
-        let q = faults.len();
         let signals =
             |all: Vec<aso_controller::design::Signal>| all.into_iter().map(Signal::from).collect();
         Ok(Self {
@@ -133,24 +115,8 @@ impl Controller {
             first_compensated,
             monitor,
             filter,
-            a: dense(&a),
-            b: dense(&b),
-            c: dense(&c),
-            d: stated(d),
-            f_a: dense(&f_a),
-            constant_faults: a_f.is_none(),
-            a_f: stated(a_f).unwrap_or_else(|| DMatrix::identity(q, q)),
-            k_x: dense(&k_x),
-            k_f: dense(&k_f),
-            l_x: dense(&l_x),
-            l_f: dense(&l_f),
-            p_f: stated(p_f),
+            matrices,
             sliding_mode,
-            h: stated(h),
-            k_i: stated(k_i),
-            f_i: stated(f_i),
-            l_w: stated(l_w),
-            n_r: stated(n_r),
             transfer,
             references: signals(references),
             states: signals(states),
@@ -169,6 +135,11 @@ impl Controller {
     /// The scheduling variable if it is a separate input; otherwise an empty list.
     pub(super) fn schedule_inputs(&self) -> &[Signal] {
         self.schedule.as_ref().and_then(Schedule::input).map_or(&[], std::slice::from_ref)
+    }
+
+    /// Whether the design states a matrix.
+    pub(super) fn has(&self, matrix: Matrix) -> bool {
+        matrix.of(self).is_some()
     }
 
     /// A matrix at each point of the schedule; `None` if the matrix does not depend on the scheduling variable.

@@ -12,14 +12,6 @@ use crate::Error;
 pub(super) struct Detection {
     /// The first sample whose residuals are tested; at least 1, as the sample at the start has none.
     pub(super) first_tested: u32,
-    /// A, k x k, of the filter x_r[k+1] = A x_r[k] + B_u u[k] + B_y y[k].
-    pub(super) a: DMatrix<f64>,
-    pub(super) b_u: DMatrix<f64>,
-    pub(super) b_y: DMatrix<f64>,
-    /// C, rows x k, of the residuals r[k] = C x_r[k] + D_u u[k] + D_y y[k].
-    pub(super) c: DMatrix<f64>,
-    pub(super) d_u: DMatrix<f64>,
-    pub(super) d_y: DMatrix<f64>,
     /// Maps the initial deviations of the states to the initial x_r, k x n.
     pub(super) start: DMatrix<f64>,
     /// The faults that a decision counts from 1.
@@ -74,12 +66,6 @@ impl Detection {
         };
         Ok(Self {
             first_tested: first_tested.max(1),
-            a: dense(&file.a),
-            b_u: dense(&file.b_u),
-            b_y: dense(&file.b_y),
-            c: dense(&file.c),
-            d_u: dense(&file.d_u),
-            d_y: dense(&file.d_y),
             start: dense(&file.start),
             faults: file.faults,
             method,
@@ -112,7 +98,10 @@ impl Detection {
     /// The number of real numbers in an instance besides the vectors of the filter: statistics and sums.
     pub(super) fn stored(&self) -> usize {
         self.tests.len()
-            + if self.method == Method::Cusum { 2 * self.tests.len() } else { self.c.nrows() }
+            + match self.method {
+                Method::Cusum => 2 * self.tests.len(),
+                Method::Window => self.tests.iter().map(|test| test.residuals).sum(),
+            }
     }
 
     /// The number of 32-bit integers in an instance besides the counter of samples. For each test: the starts of both
@@ -131,6 +120,19 @@ impl Detection {
     pub(super) fn flags(&self) -> usize {
         self.tests.len()
     }
+}
+
+/// The matrices of the filter, x_r[k+1] = `A_r` x_r[k] + `B_ru` u[k] + `B_ry` y[k], and of the residuals, r[k] = `C_r`
+/// x_r[k] + `D_ru` u[k] + `D_ry` y[k], with their names.
+pub(super) fn matrices(file: &DetectionDesign) -> [(&'static str, &aso_controller::Matrix); 6] {
+    [
+        ("A_r", &file.a),
+        ("B_ru", &file.b_u),
+        ("B_ry", &file.b_y),
+        ("C_r", &file.c),
+        ("D_ru", &file.d_u),
+        ("D_ry", &file.d_y),
+    ]
 }
 
 /// The vectors that an instance stores for the filter.

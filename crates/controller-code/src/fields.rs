@@ -3,6 +3,7 @@
 use super::controller::Controller;
 use super::names::fields;
 use super::parts::Signal;
+use super::symbols::Matrix;
 
 /// The identifiers, by kind of signal.
 pub(super) struct Fields {
@@ -25,9 +26,10 @@ impl Fields {
             faults: names(&controller.faults),
             actuators: names(&controller.actuators),
             measurements: names(&controller.measurements),
-            integrals: match controller.h {
-                Some(_) => names(&controller.references),
-                None => Vec::new(),
+            integrals: if controller.has(Matrix::H) {
+                names(&controller.references)
+            } else {
+                Vec::new()
             },
             references: names(&controller.references),
             schedule: names(controller.schedule_inputs()),

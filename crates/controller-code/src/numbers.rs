@@ -40,7 +40,7 @@ impl<N: Number> Numbers<N> {
         point: impl Fn(f64) -> N,
     ) -> Self {
         let entries = |matrix: Matrix| {
-            let dense = matrix.stated(controller)?;
+            let dense = matrix.of(controller)?;
             let rows = dense.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>());
             Some(Entries {
                 matrix,
@@ -211,8 +211,8 @@ impl Vector {
     pub(super) fn length(self, controller: &Controller) -> usize {
         let is_stated = match self {
             Self::YF | Self::NextYF | Self::StoredYF => controller.filter.is_some(),
-            Self::Excess => controller.l_w.is_some(),
-            Self::StoredU => controller.d.is_some(),
+            Self::Excess => controller.has(Matrix::LW),
+            Self::StoredU => controller.has(Matrix::D),
             Self::StoredUT | Self::NextUT => controller.transfer.is_some(),
             _ => true,
         };
@@ -226,14 +226,9 @@ impl Vector {
 }
 
 impl Matrix {
-    /// The matrix; `None` if the controller does not state it, and for `A_f` if faults are constant.
-    fn stated(self, controller: &Controller) -> Option<&nalgebra::DMatrix<f64>> {
-        self.of(controller).filter(|_| self != Self::AF || !controller.constant_faults)
-    }
-
     /// The matrices that a controller states.
     pub(super) fn all_stated(controller: &Controller) -> impl Iterator<Item = Self> {
-        Self::ALL.into_iter().filter(|matrix| matrix.stated(controller).is_some())
+        Self::ALL.into_iter().filter(|matrix| controller.has(*matrix))
     }
 
     /// The matrices of `aso_controller::sample::Design`, without the filter of the residuals.

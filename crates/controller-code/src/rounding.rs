@@ -43,7 +43,7 @@ use nalgebra::DMatrix;
 use self::analysis::Analysis;
 use super::controller::Controller;
 use super::fields::Fields;
-use super::symbols::Kind;
+use super::symbols::{Kind, Matrix};
 use super::text::{aligned, filled};
 
 /// A factor of the bound that covers products of rounding errors, and the rounding of its printed digits.
@@ -194,10 +194,13 @@ fn residual_states(controller: &Controller) -> Result<DMatrix<f64>, Error> {
     let signals: usize = Kind::ALL.map(|kind| kind.count(controller)).iter().sum();
     let k = Kind::ResidualState.count(controller);
     let mut all = DMatrix::zeros(k, signals + 1);
-    let Some(detection) = &controller.detection else { return Ok(all) };
-    for (kind, b) in [(Kind::Actuator, &detection.b_u), (Kind::Measurement, &detection.b_y)] {
+    for (kind, b) in [(Kind::Actuator, Matrix::ResidualBu), (Kind::Measurement, Matrix::ResidualBy)]
+    {
+        let (Some(a), Some(b)) = (Matrix::ResidualA.of(controller), b.of(controller)) else {
+            continue;
+        };
         let system = StateSpace {
-            a: detection.a.clone(),
+            a: a.clone(),
             b: b.clone(),
             c: DMatrix::identity(k, k),
             d: DMatrix::zeros(k, b.ncols()),

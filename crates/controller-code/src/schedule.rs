@@ -12,8 +12,9 @@ use aso_controller::design::{self, schedule};
 use nalgebra::DMatrix;
 
 use super::Precision;
-use super::parts::{Signal, dense};
+use super::parts::Signal;
 use super::symbols::{Matrix, Vector};
+use super::values::Matrices;
 use crate::Error;
 
 /// The schedule of a controller.
@@ -33,7 +34,7 @@ pub(super) struct Point {
     u_op: Vec<f64>,
     y_op: Vec<f64>,
     r_op: Vec<f64>,
-    matrices: Vec<(Matrix, DMatrix<f64>)>,
+    matrices: Matrices,
 }
 
 impl Schedule {
@@ -60,8 +61,7 @@ impl Schedule {
 
     /// A matrix at each point; `None` if the matrix does not depend on the scheduling variable.
     pub(super) fn matrices(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
-        let at = |point: &'_ Point| point.matrices.iter().position(|(name, _)| *name == matrix);
-        self.points.iter().map(|point| Some(&point.matrices[at(point)?].1)).collect()
+        self.points.iter().map(|point| point.matrices.get(matrix)).collect()
     }
 
     /// A part of the operating point at each point: one of [`super::tables::operating_vectors`].
@@ -87,7 +87,7 @@ impl Schedule {
             }
         }
         for point in &self.points {
-            let matrices = point.matrices.iter().flat_map(|(_, values)| values.iter());
+            let matrices = point.matrices.0.iter().flat_map(|(_, values)| values.iter());
             let operating = [&point.x_op, &point.u_op, &point.y_op, &point.r_op];
             let numbers = matrices.chain(operating.into_iter().flatten()).chain([&point.at]);
             if let Some(value) = numbers.copied().find(|value| value.abs() > largest) {
@@ -104,11 +104,7 @@ impl Schedule {
 
 impl Point {
     fn of(file: schedule::Point) -> Self {
-        let named = |matrix: Matrix| {
-            let (_, values) = file.matrices().find(|(name, _)| *name == matrix.name())?;
-            Some((matrix, dense(values)))
-        };
-        let matrices = Matrix::ALL.into_iter().filter_map(named).collect();
+        let matrices = Matrices::of(file.matrices());
         let schedule::Point { at, x_op, u_op, y_op, r_op, .. } = file;
         Self { at, x_op, u_op, y_op, r_op, matrices }
     }

@@ -7,6 +7,7 @@ use super::controller::Controller;
 use super::fields::Fields;
 use super::parts::Signal;
 use super::rounding::RoundingBound;
+use super::symbols::Matrix;
 use super::text::{aligned, ascii, filled, one_line};
 use super::{Precision, Request};
 use aso_controller::design::{Estimator, Loss, SlidingMode, integral_unit};
@@ -47,7 +48,7 @@ pub(super) fn descriptions_of_estimates(controller: &Controller) -> Vec<String> 
     let losses = controller.losses.iter();
     let losses =
         losses.map(|loss| format!("Estimate of the lost part of the effect of `{}`", name(loss)));
-    let integrals = controller.references.iter().filter(|_| controller.h.is_some());
+    let integrals = controller.references.iter().filter(|_| controller.has(Matrix::H));
     let integrals = integrals.map(|signal| {
         let unit = signal.unit.as_deref().map(integral_unit);
         let unit = unit.map_or_else(String::new, |unit| format!(" in {unit}"));
@@ -136,7 +137,7 @@ fn timing(request: &Request<'_>, controller: &Controller, vocabulary: &Vocabular
     let mut all = vec![format!(
         "Sample time: {period:?} s. Sample k is at k times the sample time. {estimator}"
     )];
-    if controller.d.is_some() {
+    if controller.has(Matrix::D) {
         let text = "The measurements contain the commands (D): take them just before new commands are applied, so \
                     that they contain those of the sample before.";
         all.push(text.to_owned());
@@ -160,12 +161,12 @@ fn modes(controller: &Controller) -> Vec<String> {
         0 => "the first sample".to_owned(),
         sample => format!("sample {sample} (t_on = {t_on:?} s)"),
     };
-    let estimated = match (controller.monitor, &controller.p_f) {
+    let estimated = match (controller.monitor, controller.has(Matrix::PF)) {
         (true, _) => "They are estimated in every sample (monitor).",
-        (false, None) => {
+        (false, false) => {
             "They are estimated while they are compensated; otherwise their estimates keep their values."
         }
-        (false, Some(_)) => {
+        (false, true) => {
             "They are estimated while they are compensated; otherwise their estimates are f_hat_i, which keeps \
              its value."
         }
@@ -176,7 +177,7 @@ fn modes(controller: &Controller) -> Vec<String> {
     let mut all = vec![format!(
         "Faults are compensated from {start} on while `compensate` is true. {estimated}"
     )];
-    if controller.p_f.is_some() {
+    if controller.has(Matrix::PF) {
         let text = "The estimates of faults have a direct term: f_hat = f_hat_i + P_f e, with the innovation e of \
                     the corrected estimate. The observer predicts with the integral part f_hat_i, which `init_at` \
                     sets, and which is the estimate after an overflow.";
@@ -207,11 +208,11 @@ fn modes(controller: &Controller) -> Vec<String> {
              the new law: the distance u_t at this sample is added to it, and u_t := u_t - {transfer:?} u_t."
         ));
     }
-    if controller.h.is_some() {
+    if controller.has(Matrix::H) {
         let text = "The integrals x_i of the distances of the measurements from their references start at 0; \
                     while a command is at a limit, they follow the limited command (L_w).";
         let plain = "The integrals x_i of the distances of the measurements from their references start at 0.";
-        all.push(if controller.l_w.is_some() { text } else { plain }.to_owned());
+        all.push(if controller.has(Matrix::LW) { text } else { plain }.to_owned());
     }
     all
 }

@@ -12,8 +12,8 @@ pub(super) fn stored(controller: &Controller) -> Vec<Vector> {
     all.extend(controller.filter.is_some().then_some(Vector::StoredYF));
     all.push(Vector::Measured);
     all.extend((!controller.references.is_empty()).then_some(Vector::Referred));
-    all.extend(controller.h.is_some().then_some(Vector::StoredXI));
-    all.extend(controller.d.is_some().then_some(Vector::StoredU));
+    all.extend(controller.has(Matrix::H).then_some(Vector::StoredXI));
+    all.extend(controller.has(Matrix::D).then_some(Vector::StoredU));
     all.extend(controller.transfer.is_some().then_some(Vector::StoredUT));
     if controller.detection.is_some() {
         all.extend(detection::STORED);

@@ -3,7 +3,7 @@
 use super::Source;
 use crate::detection::Method;
 use crate::reconfiguration::Reconfiguration;
-use crate::symbols::Kind;
+use crate::symbols::{Kind, Matrix};
 use crate::tables::has_constant_matrix;
 use crate::text::Lines;
 use aso_controller::design::Estimator;
@@ -76,16 +76,16 @@ impl Source<'_> {
             ("MONITORS", controller.monitor),
             ("COUNTS_SAMPLES", controller.has_counter()),
             ("HAS_CONSTANT_MATRIX", has_constant_matrix(controller)),
-            ("HAS_FEEDTHROUGH", controller.d.is_some()),
+            ("HAS_FEEDTHROUGH", controller.has(Matrix::D)),
             ("HAS_FILTER", controller.filter.is_some()),
-            ("HAS_FAULT_MODEL", !controller.constant_faults),
-            ("HAS_DIRECT_TERM", controller.p_f.is_some()),
+            ("HAS_FAULT_MODEL", controller.has(Matrix::AF)),
+            ("HAS_DIRECT_TERM", controller.has(Matrix::PF)),
             ("HAS_SLIDING_MODE", controller.sliding_mode.is_some()),
             ("HAS_REFERENCES", !controller.references.is_empty()),
-            ("HAS_INTEGRALS", controller.h.is_some()),
-            ("HAS_SENSOR_FAULTS_IN_INTEGRALS", controller.f_i.is_some()),
-            ("HAS_BACK_CALCULATION", controller.l_w.is_some()),
-            ("HAS_FEEDFORWARD", controller.n_r.is_some()),
+            ("HAS_INTEGRALS", controller.has(Matrix::H)),
+            ("HAS_SENSOR_FAULTS_IN_INTEGRALS", controller.has(Matrix::FI)),
+            ("HAS_BACK_CALCULATION", controller.has(Matrix::LW)),
+            ("HAS_FEEDFORWARD", controller.has(Matrix::NR)),
             ("HAS_TRANSFER", controller.transfer.is_some()),
             ("HAS_LIMITS", controller.is_limited()),
             ("HAS_LOSSES", !controller.losses.is_empty()),

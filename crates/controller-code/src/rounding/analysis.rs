@@ -10,7 +10,7 @@ use super::first_signal;
 use super::rounded::{Elements, Rounded, UNIT, Widths, constant_error};
 use crate::controller::Controller;
 use crate::numbers::{Memory, Numbers, Vectors};
-use crate::symbols::{Kind, Vector};
+use crate::symbols::{Kind, Matrix, Vector};
 use aso_controller::design::{Estimator, SlidingMode};
 
 /// Follows the equations of a sample, and collects the rounding errors.
@@ -49,9 +49,10 @@ impl<'a> Analysis<'a> {
         analysis.start(Vector::StoredXHat, |form| form.columns_mut(n, n).fill_with_identity());
         let q = analysis.count(Kind::Fault);
         analysis.start(Vector::StoredFHat, |form| form.columns_mut(2 * n, q).fill_with_identity());
+        let [a, c] = [Matrix::A, Matrix::C].map(|matrix| analysis.matrix(matrix));
         match &controller.filter {
             None => analysis.start(Vector::Measured, |form| {
-                form.columns_mut(0, n).copy_from(&controller.c);
+                form.columns_mut(0, n).copy_from(&c);
             }),
             Some(filter) => {
                 // The last states of the design are the filtered measurements, which the controller
@@ -62,7 +63,7 @@ impl<'a> Analysis<'a> {
                 });
                 analysis.start(Vector::Measured, |form| {
                     for (k, w) in filter.iter().enumerate() {
-                        let row = controller.a.view((first + k, 0), (1, first)) / *w;
+                        let row = a.view((first + k, 0), (1, first)) / *w;
                         form.view_mut((k, 0), (1, first)).copy_from(&row);
                     }
                 });
@@ -81,7 +82,7 @@ impl<'a> Analysis<'a> {
         // times the rounding of these commands as values remains.
         analysis.start(Vector::StoredU, |_| {});
         analysis.start(Vector::StoredUT, |_| {});
-        if controller.d.is_some() {
+        if controller.has(Matrix::D) {
             let deviations = analysis.get(Vector::StoredU).numbers();
             let sums = deviations.into_iter().zip(analysis.get(Vector::UOp).numbers());
             let rounded: Vec<_> = sums.map(|(deviation, point)| deviation + point).collect();
@@ -97,6 +98,16 @@ impl<'a> Analysis<'a> {
 
     fn count(&self, kind: Kind) -> usize {
         kind.count(self.controller)
+    }
+
+    /// A matrix of the controller; without it zero, or for `A_f` the identity, as faults are then constant.
+    fn matrix(&self, matrix: Matrix) -> DMatrix<f64> {
+        let [rows, columns] = matrix.kinds().map(|kind| self.count(kind));
+        let default = || match matrix {
+            Matrix::AF => DMatrix::identity(rows, columns),
+            _ => DMatrix::zeros(rows, columns),
+        };
+        matrix.of(self.controller).cloned().unwrap_or_else(default)
     }
 
     /// Number of states of the loop: plant, stored `x_hat`, stored `f_hat`, `x_i`, `x_r`.
@@ -152,18 +163,17 @@ impl<'a> Analysis<'a> {
         let mut magnitude = match vector {
             Vector::StoredXR | Vector::NextXR => return self.state_of_filter.clone(),
             Vector::Residual => return self.residual_magnitude(),
-            Vector::S => return self.controller.l_f.abs() * self.get(Vector::E).magnitude,
+            Vector::S => return self.matrix(Matrix::LF).abs() * self.get(Vector::E).magnitude,
             Vector::E => return self.innovation(&self.get(Vector::XHat).magnitude),
             Vector::StoredXHat | Vector::NextXHat | Vector::XHat if self.is_predicted(vector) => {
-                let Controller { a, b, f_a, .. } = self.controller;
-                a.abs() * self.unit(Kind::State)
-                    + b.abs() * self.unit(Kind::Actuator)
-                    + f_a.abs() * self.integral_part()
+                self.matrix(Matrix::A).abs() * self.unit(Kind::State)
+                    + self.matrix(Matrix::B).abs() * self.unit(Kind::Actuator)
+                    + self.matrix(Matrix::FA).abs() * self.integral_part()
             }
             Vector::StoredFHat | Vector::NextFHat | Vector::FHat | Vector::FHatI
                 if self.is_predicted(vector) =>
             {
-                self.controller.a_f.abs() * self.integral_part()
+                self.matrix(Matrix::AF).abs() * self.integral_part()
             }
             Vector::StoredFHat | Vector::NextFHat | Vector::FHatI => self.integral_part(),
             Vector::Y | Vector::StoredYF | Vector::YF | Vector::NextYF => self.measured(),
@@ -194,7 +204,7 @@ impl<'a> Analysis<'a> {
                     true
                 }
                 Vector::XHat | Vector::FHatI => is_first(),
-                Vector::FHat => self.controller.p_f.is_none() && is_first(),
+                Vector::FHat => !self.controller.has(Matrix::PF) && is_first(),
                 _ => false,
             }
     }
@@ -209,39 +219,31 @@ impl<'a> Analysis<'a> {
 
     /// A bound of the innovation: |e| <= |y - D u| + |C| |x_hat|.
     fn innovation(&self, x_hat: &DMatrix<f64>) -> DMatrix<f64> {
-        self.measured() + self.controller.c.abs() * x_hat
+        self.measured() + self.matrix(Matrix::C).abs() * x_hat
     }
 
     /// A bound of the measurements without feedthrough: |y - D u| <= |y| + |D| |u|; y without D.
     fn measured(&self) -> DMatrix<f64> {
-        let y = self.unit(Kind::Measurement);
-        match &self.controller.d {
-            None => y,
-            Some(d) => y + d.abs() * self.unit(Kind::Actuator),
-        }
+        let of_commands = self.matrix(Matrix::D).abs() * self.unit(Kind::Actuator);
+        self.unit(Kind::Measurement) + of_commands
     }
 
     /// A bound of the integral part of the fault estimates: |f_hat_i| <= |f_hat| + |P_f| |e| with a direct term, else
     /// |f_hat|.
     fn integral_part(&self) -> DMatrix<f64> {
-        let f_hat = self.unit(Kind::Fault);
-        match &self.controller.p_f {
-            None => f_hat,
-            Some(p_f) => f_hat + p_f.abs() * self.innovation(&self.unit(Kind::State)),
-        }
+        let innovation = self.innovation(&self.unit(Kind::State));
+        self.unit(Kind::Fault) + self.matrix(Matrix::PF).abs() * innovation
     }
 
     /// A bound of the residuals, residuals x signals: |r| <= |C| |x_r| + |D_u| |u| + |D_y| |y|.
     fn residual_magnitude(&self) -> DMatrix<f64> {
-        let Some(detection) = &self.controller.detection else {
-            return DMatrix::zeros(0, self.widths().signals);
-        };
-        let mut all = detection.c.abs() * &self.state_of_filter;
+        let mut all = self.matrix(Matrix::ResidualC).abs() * &self.state_of_filter;
         for (kind, matrix) in
-            [(Kind::Actuator, &detection.d_u), (Kind::Measurement, &detection.d_y)]
+            [(Kind::Actuator, Matrix::ResidualDu), (Kind::Measurement, Matrix::ResidualDy)]
         {
             let first = first_signal(kind, self.controller);
-            all.columns_mut(first, matrix.ncols()).add_assign(&matrix.abs());
+            let direct = self.matrix(matrix).abs();
+            all.columns_mut(first, direct.ncols()).add_assign(&direct);
         }
         all
     }
@@ -272,12 +274,12 @@ impl<'a> Analysis<'a> {
             _ => self.get(vector).numbers(),
         });
         let (state, mut vectors) = (memory.state(), Vectors::zero(controller));
-        let has_direct_term = controller.p_f.is_some();
+        let has_direct_term = controller.has(Matrix::PF);
         let integral = if has_direct_term { Vector::FHatI } else { Vector::FHat };
         vectors.signals().set_deviations(&design, &state);
         self.record_all(&mut vectors, [Vector::Y, Vector::XHat, Vector::YF, Vector::R]);
         self.record_as(&mut vectors, Vector::FHatI, integral);
-        if controller.d.is_some() {
+        if controller.has(Matrix::D) {
             vectors.signals().remove_feedthrough(&design, &state);
             self.record_all(&mut vectors, [Vector::Y]);
         }
@@ -423,8 +425,8 @@ impl<'a> Analysis<'a> {
         let inputs = self.errors.len();
         let command = self.get(Vector::Command).form;
         let mut next = DMatrix::zeros(order, self.widths().forms);
-        next.view_mut((0, 0), (n, n)).copy_from(&self.controller.a);
-        next.rows_mut(0, n).add_assign(&(&self.controller.b * &command));
+        next.view_mut((0, 0), (n, n)).copy_from(&self.matrix(Matrix::A));
+        next.rows_mut(0, n).add_assign(&(self.matrix(Matrix::B) * &command));
         if self.controller.filter.is_some() {
             next.rows_mut(n - p, p).copy_from(&self.get(Vector::NextYF).form);
         }

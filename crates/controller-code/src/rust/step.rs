@@ -105,7 +105,7 @@ impl Controller {{
             self.started = true;
         }",
         );
-        if controller.h.is_some() {
+        if controller.has(Matrix::H) {
             let mutable = if controller.limits_holds() { "mut " } else { "" };
             lines.push(format!("        let {mutable}x_i_value = self.x_i;"));
         }
@@ -141,7 +141,7 @@ impl Controller {{
         lines.push("            signals.keep(&mut state, true);");
         lines.push_if(controller.transfer.is_some(), "            self.law = None;");
         lines.push_if(controller.filter.is_some(), "            self.started = false;");
-        lines.push_if(controller.h.is_some(), "            x_i_value = [0.0; REFERENCES];");
+        lines.push_if(controller.has(Matrix::H), "            x_i_value = [0.0; REFERENCES];");
         if controller.detection.is_some() {
             lines.push("            self.x_r = [0.0; RESIDUAL_STATES];");
             lines.push("            self.residual = [0.0; RESIDUALS];");
@@ -309,9 +309,9 @@ impl Controller {{
             ("x_hat", true),
             ("f_hat", true),
             ("y_f", controller.filter.is_some()),
-            ("x_i", controller.h.is_some()),
+            ("x_i", controller.has(Matrix::H)),
             ("u_t", controller.transfer.is_some()),
-            ("u_before", controller.d.is_some()),
+            ("u_before", controller.has(Matrix::D)),
             ("u", true),
         ] {
             let place = if is_stated { format!("self.{name}") } else { "[]".to_owned() };

@@ -2,7 +2,7 @@
 
 use super::Source;
 use crate::summary::{descriptions, descriptions_of_estimates};
-use crate::symbols::Vector;
+use crate::symbols::{Matrix, Vector};
 use crate::tables::{starts, stored};
 use crate::text::Lines;
 
@@ -179,8 +179,8 @@ impl Controller {{
             "            x_r,\n            residual: [0.0; RESIDUALS],",
         );
         lines.push_if(!controller.references.is_empty(), format!("            r: {r},"));
-        lines.push_if(controller.h.is_some(), "            x_i: [0.0; REFERENCES],");
-        lines.push_if(controller.d.is_some(), "            u_before: [0.0; ACTUATORS],");
+        lines.push_if(controller.has(Matrix::H), "            x_i: [0.0; REFERENCES],");
+        lines.push_if(controller.has(Matrix::D), "            u_before: [0.0; ACTUATORS],");
         lines.push_if(controller.transfer.is_some(), "            u_t: [0.0; ACTUATORS],");
         if let [input] = controller.schedule_inputs() {
             lines.push(format!("            theta: [{}],", self.literal(input.operating)));
