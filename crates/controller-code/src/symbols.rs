@@ -135,18 +135,22 @@ matrices! {
 }
 
 macro_rules! kinds {
-    ($($(#[$text:meta])* $kind:ident $plural:literal,)*) => {
+    ($($(#[$about:meta])* $list:ident: $count:literal {
+        $($(#[$text:meta])* $kind:ident $plural:literal,)*
+    })*) => {
         /// The kinds of signals and of other numbered parts of a controller.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub(super) enum Kind {
-            $($(#[$text])* $kind,)*
+            $($($(#[$text])* $kind,)*)*
         }
 
         impl Kind {
+            $($(#[$about])* pub(super) const $list: [Self; $count] = [$(Self::$kind),*];)*
+
             /// The name of the constant with the number of members of this kind.
             pub(super) fn plural(self) -> &'static str {
                 match self {
-                    $(Self::$kind => $plural,)*
+                    $($(Self::$kind => $plural,)*)*
                 }
             }
         }
@@ -155,44 +159,28 @@ macro_rules! kinds {
 
 // Each kind with the name of the constant with the number of its members.
 kinds! {
-    State "STATES",
-    Fault "FAULTS",
-    Actuator "ACTUATORS",
-    Measurement "MEASUREMENTS",
-    Reference "REFERENCES",
-    /// The integral of the distance from a reference.
-    Integral "REFERENCES",
-    /// Kinds that are no signals: points of the schedule; states of the filter of the detection, its residuals, its
-    /// tests, and the faults that it can isolate.
-    Point "POINTS",
-    ResidualState "RESIDUAL_STATES",
-    Residual "RESIDUALS",
-    Test "TESTS",
-    Suspect "SUSPECTS",
-    /// Kinds of the reconfiguration: sets of gains, and actuators that may be gone.
-    GainSet "GAIN_SETS",
-    Case "CASES",
-}
-
-impl Kind {
     /// All kinds of signals.
-    pub(super) const ALL: [Self; 6] = [
-        Self::State,
-        Self::Fault,
-        Self::Measurement,
-        Self::Actuator,
-        Self::Reference,
-        Self::Integral,
-    ];
+    ALL: 6 {
+        State "STATES",
+        Fault "FAULTS",
+        Measurement "MEASUREMENTS",
+        Actuator "ACTUATORS",
+        Reference "REFERENCES",
+        /// The integral of the distance from a reference.
+        Integral "REFERENCES",
+    }
 
     /// The kinds that are no signals.
-    pub(super) const OTHERS: [Self; 7] = [
-        Self::Point,
-        Self::ResidualState,
-        Self::Residual,
-        Self::Test,
-        Self::Suspect,
-        Self::GainSet,
-        Self::Case,
-    ];
+    OTHERS: 7 {
+        /// The points of the schedule.
+        Point "POINTS",
+        /// The states of the filter of the detection, its residuals, its tests, and the faults that it can isolate.
+        ResidualState "RESIDUAL_STATES",
+        Residual "RESIDUALS",
+        Test "TESTS",
+        Suspect "SUSPECTS",
+        /// Of the reconfiguration: sets of gains, and actuators that may be gone.
+        GainSet "GAIN_SETS",
+        Case "CASES",
+    }
 }
