@@ -17,7 +17,8 @@ pub(super) struct Detection {
     /// The faults that a decision counts from 1.
     pub(super) faults: Vec<String>,
     pub(super) method: Method,
-    pub(super) tests: Vec<Test>,
+    /// The tests, all with `drift` or all with `window`.
+    pub(super) tests: Vec<TestDesign>,
 }
 
 /// The method of all tests of a detection.
@@ -27,19 +28,6 @@ pub(super) enum Method {
     Cusum,
     /// The squared norm of the mean of one or more residuals over a window.
     Window,
-}
-
-/// A test of the residuals; each takes the next `residuals` rows of r.
-pub(super) struct Test {
-    pub(super) name: String,
-    pub(super) residuals: usize,
-    /// The drift kappa of the cumulative sums, or 0.
-    pub(super) drift: f64,
-    /// The number of samples in a window, or 0.
-    pub(super) window: u32,
-    pub(super) threshold: f64,
-    /// For each fault whether this test reacts to it.
-    pub(super) reacts: Vec<bool>,
 }
 
 impl Detection {
@@ -56,39 +44,31 @@ impl Detection {
                 return Err(Error(text.to_owned()));
             }
         };
-        let test = |design: TestDesign| Test {
-            name: design.name,
-            residuals: design.residuals,
-            drift: design.drift.unwrap_or_default(),
-            window: design.window.unwrap_or_default(),
-            threshold: design.threshold,
-            reacts: design.reacts,
-        };
         Ok(Self {
             first_tested: first_tested.max(1),
             start: dense(&file.start),
             faults: file.faults,
             method,
-            tests: file.tests.into_iter().map(test).collect(),
+            tests: file.tests,
         })
     }
 
     /// The real numbers of the tests and of the start of the filter, for a check of their range.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
-        let tests = self.tests.iter().flat_map(|test| [test.drift, test.threshold]);
-        self.start.iter().copied().chain(tests)
+        let tests = self.tests.iter().flat_map(|test| [test.drift, Some(test.threshold)]);
+        self.start.iter().copied().chain(tests.flatten())
     }
 
     /// The tables of real numbers: the start of the filter, then drifts and thresholds of the tests.
     pub(super) fn tables(&self) -> Vec<Constants> {
-        let of_tests = |name, meaning, value: fn(&Test) -> f64| {
+        let of_tests = |name, meaning, value: fn(&TestDesign) -> f64| {
             Constants::vector(name, meaning, Kind::Test, self.tests.iter().map(value).collect())
         };
         let meaning = "start of x_r, times the deviations of the states";
         let kinds = [Kind::ResidualState, Kind::State];
         let mut all = vec![Constants::matrices("start_r", meaning, kinds, None, [&self.start])];
         if self.method == Method::Cusum {
-            all.push(of_tests("drift", "tests", |test| test.drift));
+            all.push(of_tests("drift", "tests", |test| test.drift.unwrap_or_default()));
         }
         let meaning = if self.method == Method::Cusum { "" } else { "tests" };
         all.push(of_tests("threshold", meaning, |test| test.threshold));

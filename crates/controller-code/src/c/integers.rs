@@ -2,11 +2,12 @@
 //! holds.
 
 use super::{Source, wrapped};
-use crate::detection::{Detection, Method, Test};
+use crate::detection::{Detection, Method};
 use crate::reconfiguration::{Case, Reconfiguration};
 use crate::symbols::Kind;
 use crate::text::Lines;
 use aso_controller::design::Loss;
+use aso_controller::design::detection::TestDesign;
 
 impl Source<'_> {
     pub(super) fn integer_tables(&self, lines: &mut Lines) {
@@ -30,9 +31,9 @@ impl Source<'_> {
         let (tests, suspects) = (self.count(Kind::Test), self.count(Kind::Suspect));
         if detection.method == Method::Window {
             let of_tests = detection.tests.iter();
-            let residuals = |test: &Test| test.residuals;
+            let residuals = |test: &TestDesign| test.residuals;
             numbers(lines, ["taken_residuals", &tests], of_tests.clone().map(residuals));
-            let samples = |test: &Test| test.window as usize;
+            let samples = |test: &TestDesign| test.window.unwrap_or_default() as usize;
             numbers(lines, ["window", &tests], of_tests.map(samples));
         }
         lines.push("\n/* Which tests react to each fault. */");

@@ -84,7 +84,7 @@ static VALIDITY: Validity<'static, {}> = Validity {{
         if detection.method == Method::Window {
             let counts = detection.tests.iter().map(|test| test.residuals.to_string());
             list(lines, "COUNTS: [usize; TESTS]", counts);
-            let lengths = detection.tests.iter().map(|test| test.window.to_string());
+            let lengths = detection.tests.iter().filter_map(|test| Some(test.window?.to_string()));
             list(lines, "LENGTHS: [u32; TESTS]", lengths);
         }
         let rows = reactions(detection).into_iter().map(|row| format!("[{}]", row.join(", ")));

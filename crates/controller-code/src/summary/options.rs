@@ -87,8 +87,8 @@ pub(super) fn detection(controller: &Controller, precision: Precision) -> Vec<St
         let residuals = if test.residuals == 1 { "" } else { "s" };
         let range: Vec<_> = (first..last).map(|row| row.to_string()).collect();
         let window = match detection.method {
-            Method::Cusum => format!(", drift {:?}", test.drift),
-            Method::Window => format!(", N = {}", test.window),
+            Method::Cusum => format!(", drift {:?}", test.drift.unwrap_or_default()),
+            Method::Window => format!(", N = {}", test.window.unwrap_or_default()),
         };
         all.push(format!(
             "Test {k}, {}: residual{residuals} {}{window}, threshold {:?}",
