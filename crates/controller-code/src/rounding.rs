@@ -160,10 +160,8 @@ impl RoundingBound {
         signals.extend(named("", &fields.references));
         signals.extend(named("x_i_", &fields.integrals));
         signals.push("1".to_owned());
-        let intact = match controller.reconfiguration {
-            None => "",
-            Some(_) => " and no actuator gone",
-        };
+        let intact =
+            if controller.reconfiguration.is_some() { " and no actuator gone" } else { "" };
         let used = if controller.checks_measurements() { " and no measurement held" } else { "" };
         let settled = if controller.transfer.is_some() { " and u_t = 0" } else { "" };
         let mut lines = filled(&format!(

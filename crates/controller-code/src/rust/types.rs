@@ -62,29 +62,6 @@ pub struct Controller {",
     /// Adds the structures of the status of a sample, and of its results.
     fn outputs_structure(&self, lines: &mut Lines) {
         let controller = self.controller;
-        let reconfiguration = match controller.reconfiguration {
-            None => "",
-            Some(_) => {
-                "
-    /// The position from 1 of the first actuator that the controller does without; 0 if there is none, -1 in the
-    /// fall-back.
-    pub reconfiguration: i32,"
-            }
-        };
-        let detection = match controller.detection {
-            None => "",
-            Some(_) => {
-                "\n    /// Decision, residuals and statistics.\n    pub detection: Detection,"
-            }
-        };
-        let outside = match controller.schedule {
-            None => "",
-            Some(_) => {
-                "
-    /// The scheduling variable is outside of the schedule; the nearest point was used.
-    pub outside: bool,"
-            }
-        };
         let inputs = match controller.schedule_inputs() {
             [] => "A measurement or reference",
             _ => "A measurement, a reference or the scheduling variable",
@@ -94,13 +71,6 @@ pub struct Controller {",
     /// outside of its range; its last other value was used."
         } else {
             "; its last finite value was used."
-        };
-        let lost = if controller.limits_holds() {
-            "
-    /// The last value of a measurement was used for too long; commands and estimates are those of the operating point.
-    pub lost: bool,"
-        } else {
-            ""
         };
         lines.push(format!(
             "
@@ -112,20 +82,40 @@ pub struct Status {{
     /// A command is at a limit.
     pub at_limit: bool,
     /// A sum was beyond the range of the numbers; commands and estimates keep their values.
-    pub overflow: bool,{outside}{lost}
-}}
+    pub overflow: bool,"
+        ));
+        lines.push_if(
+            controller.schedule.is_some(),
+            "    /// The scheduling variable is outside of the schedule; the nearest point was used.
+    pub outside: bool,",
+        );
+        lines.push_if(
+            controller.limits_holds(),
+            "    /// The last value of a measurement was used for too long; commands and estimates are those of the operating point.
+    pub lost: bool,",
+        );
+        lines.push(
+            "}
 
 /// The results of a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Outputs {{
+pub struct Outputs {
     /// The commands.
     pub commands: Commands,
     /// The estimates.
-    pub estimates: Estimates,{detection}{reconfiguration}
-    /// What was unusual.
-    pub status: Status,
-}}"
-        ));
+    pub estimates: Estimates,",
+        );
+        lines.push_if(
+            controller.detection.is_some(),
+            "    /// Decision, residuals and statistics.\n    pub detection: Detection,",
+        );
+        lines.push_if(
+            controller.reconfiguration.is_some(),
+            "    /// The position from 1 of the first actuator that the controller does without; 0 if there is none, -1 in the
+    /// fall-back.
+    pub reconfiguration: i32,",
+        );
+        lines.push("    /// What was unusual.\n    pub status: Status,\n}");
     }
 
     /// Adds the functions that start an instance.
