@@ -53,7 +53,8 @@ impl Domain {
     }
 
     /// The eigenvalue of a constant signal: 0 in continuous, 1 in sampled time.
-    pub(crate) fn constant(self) -> f64 {
+    #[must_use]
+    pub fn constant(self) -> f64 {
         match self {
             Self::Continuous => 0.0,
             Self::Sampled { .. } => 1.0,

@@ -79,10 +79,8 @@ impl LinearPlant {
 
     /// Returns the matrix of the states in the condition of rest: A in A x + B u = 0, in sampled time A - I.
     pub(crate) fn a_at_rest(&self) -> DMatrix<f64> {
-        match self.domain {
-            Domain::Continuous => self.a.clone(),
-            Domain::Sampled { .. } => &self.a - DMatrix::identity(self.a.nrows(), self.a.nrows()),
-        }
+        let n = self.a.nrows();
+        &self.a - DMatrix::from_diagonal_element(n, n, self.domain.constant())
     }
 
     /// Returns Phi and Gamma, with which the states after `time` are Phi x + Gamma u if u is held. `inputs`: the

@@ -83,11 +83,6 @@ pub(crate) fn check_detectable(
         let message = format!("fault `{name}` cannot be seen from the measurements {measurements}");
         return Err(at_fault(file, linear, invisible, message).into());
     }
-    // The eigenvalue of a constant signal.
-    let constant = match linear.domain {
-        Domain::Continuous => Complex::ZERO,
-        Domain::Sampled { .. } => Complex::ONE,
-    };
     if let Some(hidden) = detectability.hidden.first() {
         let faults = hidden.faults();
         let states: Vec<_> = hidden.states().iter().map(|&at| state_name(linear, at)).collect();
@@ -102,7 +97,7 @@ pub(crate) fn check_detectable(
              {measurements} cannot tell a {} of {} from {}",
             hidden.rank,
             hidden.expected,
-            if hidden.at == constant { "constant value" } else { "change" },
+            if hidden.at == Complex::from(linear.domain.constant()) { "constant value" } else { "change" },
             distinguished.join(", "),
             from,
         );

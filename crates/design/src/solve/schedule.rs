@@ -312,10 +312,7 @@ impl Slopes {
         let y = DMatrix::from_column_slice(self.y.len(), 1, &self.y);
         let u = DMatrix::from_column_slice(self.u.len(), 1, &self.u);
         let mut changed = system.clone();
-        let held = match system.domain {
-            Domain::Continuous => z.scale(0.0),
-            Domain::Sampled { .. } => z.clone(),
-        };
+        let held = z.scale(system.domain.constant());
         let to_z = held - &system.a * &z - &system.b * &y;
         let to_u = u - &system.c * &z - &system.d * &y;
         changed.b.set_column(j, &(system.b.column(j) + to_z.column(0)));

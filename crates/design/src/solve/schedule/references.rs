@@ -130,10 +130,7 @@ fn feedforward(
 fn error(point: &Point, h: &DMatrix<f64>, n_r: &DMatrix<f64>) -> Result<f64, Error> {
     let plant = &point.physical;
     let n = plant.a.nrows();
-    let held = match plant.domain {
-        Domain::Continuous => DMatrix::zeros(n, n),
-        Domain::Sampled { .. } => DMatrix::identity(n, n),
-    };
+    let held = DMatrix::from_diagonal_element(n, n, plant.domain.constant());
     let dynamics = held - &plant.a - &plant.b * point.gains.k_x.columns(0, n);
     let states = dynamics.lu().solve(&(&plant.b * n_r));
     let states = states.ok_or(Error::Overflow { what: "the gain at rest" })?;
