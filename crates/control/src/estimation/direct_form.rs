@@ -139,7 +139,7 @@ impl DirectForm {
         if order == 0 {
             return Ok(DMatrix::zeros(a.nrows(), c.ncols()));
         }
-        let (a, c) = if part.fixed.is_empty() { (&a, &c) } else { (&part.a, &part.b) };
+        let (a, c) = part.pair(&a, &c);
         let faster = |i: usize| 2_f64.powf(as_number(i) / as_number(order));
         let pole = |i: usize| eigenvalue(rate * faster(i), self.domain);
         let poles: Vec<_> = (0..order).map(|i| Complex::new(pole(i), 0.0)).collect();
@@ -149,8 +149,7 @@ impl DirectForm {
                 place_estimator(&a.transpose(), &c.transpose(), &poles)?.0.transpose()
             }
         };
-        let gain = if part.fixed.is_empty() { gain } else { part.gain(&gain) };
-        Ok(gain.transpose())
+        Ok(part.complete(&gain).transpose())
     }
 
     /// T = [`M_1` C; N], n x n: from x to the coordinates [`y_1`; w].

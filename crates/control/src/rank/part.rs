@@ -27,6 +27,22 @@ pub struct ControllablePart {
 }
 
 impl ControllablePart {
+    /// The pair to compute a gain for: (`A_1`, `B_1`), or without fixed modes (A, B) in its own coordinates.
+    #[must_use]
+    pub fn pair<'a>(
+        &'a self,
+        a: &'a DMatrix<f64>,
+        b: &'a DMatrix<f64>,
+    ) -> (&'a DMatrix<f64>, &'a DMatrix<f64>) {
+        if self.fixed.is_empty() { (a, b) } else { (&self.a, &self.b) }
+    }
+
+    /// K, m x n, from the gain of the pair of [`Self::pair`].
+    #[must_use]
+    pub fn complete(&self, gain: &DMatrix<f64>) -> DMatrix<f64> {
+        if self.fixed.is_empty() { gain.clone() } else { self.gain(gain) }
+    }
+
     /// K, m x n, of the feedback u = `K_1` z of the controllable part: K = `K_1` T.
     #[must_use]
     pub fn gain(&self, part_gain: &DMatrix<f64>) -> DMatrix<f64> {

@@ -37,11 +37,9 @@ pub(crate) fn feedback(
             let Assignment { required, movable } = movable(required, &part.fixed, domain)?;
             let sampled = domain != Domain::Continuous;
             let assign = if sampled { alternatives_discrete } else { alternatives };
-            if part.fixed.is_empty() {
-                return Ok(assigned(&assign(a, b, &movable)?, &required));
-            }
-            let gains = assign(&part.a, &part.b, &movable)?.map(|gain| part.gain(gain));
-            Ok(partly_assigned(&gains, &required, &part))
+            let (a_1, b_1) = part.pair(a, b);
+            let gains = assign(a_1, b_1, &movable)?.map(|gain| part.complete(gain));
+            Ok(assigned(&gains, &required, &part))
         }
         Requirement::Weights { states, channels } => {
             let weights = Weights { q: states.clone(), r: channels.clone(), n: None };
@@ -52,10 +50,9 @@ pub(crate) fn feedback(
         Requirement::Region(region) => {
             let part = controllable_part(a, b)?;
             require(*region, &part.fixed, domain)?;
-            let (a_1, b_1) = if part.fixed.is_empty() { (*a, *b) } else { (&part.a, &part.b) };
+            let (a_1, b_1) = part.pair(a, b);
             let outcome = lmi::state_feedback(a_1, b_1, &region.stated(), None, domain)?;
-            let result = synthesised(outcome, IN_REGION)?;
-            Ok(if part.fixed.is_empty() { result } else { result.mapped(|gain| part.gain(gain)) })
+            Ok(synthesised(outcome, IN_REGION)?.mapped(|gain| part.complete(gain)))
         }
         Requirement::HInfinity { bound, region, channel } => {
             require(*region, &uncontrollable_modes(a, b)?, domain)?;
@@ -79,10 +76,7 @@ pub(crate) fn observer(
         Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => {
             let part = controllable_part(&a_dual, &b_dual)?;
             let Assignment { required, movable } = movable(required, &part.fixed, domain)?;
-            let (a_1, b_1) = match part.fixed.as_slice() {
-                [] => (&a_dual, &b_dual),
-                _ => (&part.a, &part.b),
-            };
+            let (a_1, b_1) = part.pair(&a_dual, &b_dual);
             let gains = match domain {
                 Domain::Continuous => {
                     alternatives_balanced(a_1, b_1, &movable)?.map(|gain| -gain.transpose())
@@ -91,11 +85,8 @@ pub(crate) fn observer(
                     estimator_alternatives(&a_1.transpose(), &b_1.transpose(), &movable)?
                 }
             };
-            if part.fixed.is_empty() {
-                return Ok(assigned(&gains, &required));
-            }
-            let gains = gains.map(|gain| part.gain(&gain.transpose()).transpose());
-            Ok(partly_assigned(&gains, &required, &part))
+            let gains = gains.map(|gain| part.complete(&gain.transpose()).transpose());
+            Ok(assigned(&gains, &required, &part))
         }
         Requirement::Weights { states, channels } => {
             let filter = kalman(a_0, c_0, states, channels, domain)?;
@@ -116,13 +107,11 @@ pub(crate) fn observer(
         Requirement::Region(region) => {
             let part = controllable_part(&a_dual, &b_dual)?;
             require(*region, &part.fixed, domain)?;
-            let whole = part.fixed.is_empty();
-            let (a_1, c_1) = (part.a.transpose(), part.b.transpose());
-            let (a_1, c_1) = if whole { (a_0, &output) } else { (&a_1, &c_1) };
-            let outcome = lmi::observer_gain(a_1, c_1, &region.stated(), None, domain)?;
-            let result = synthesised(outcome, IN_REGION)?;
-            let complete = |gain: &DMatrix<f64>| part.gain(&gain.transpose()).transpose();
-            Ok(if whole { result } else { result.mapped(complete) })
+            let (a_1, b_1) = part.pair(&a_dual, &b_dual);
+            let (a_1, c_1) = (a_1.transpose(), b_1.transpose());
+            let outcome = lmi::observer_gain(&a_1, &c_1, &region.stated(), None, domain)?;
+            let complete = |gain: &DMatrix<f64>| part.complete(&gain.transpose()).transpose();
+            Ok(synthesised(outcome, IN_REGION)?.mapped(complete))
         }
         Requirement::HInfinity { bound, region, channel } => {
             require(*region, &uncontrollable_modes(&a_dual, &b_dual)?, domain)?;
@@ -174,12 +163,25 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
     Ok(Assignment { required: movable.iter().copied().chain(fixed_eigenvalues).collect(), movable })
 }
 
-fn assigned(alternatives: &Alternatives, required: &[Complex<f64>]) -> GainResult {
-    let method = "Eigenvalues assigned, with eigenvectors as well-conditioned as was found.";
+/// Returns the results of an assignment, without the quality if there are fixed modes: it holds for the movable part
+/// alone.
+fn assigned(
+    alternatives: &Alternatives,
+    required: &[Complex<f64>],
+    part: &ControllablePart,
+) -> GainResult {
+    let conditioned = "assigned, with eigenvectors as well-conditioned as was found";
+    let is_whole = part.fixed.is_empty();
+    let method = if is_whole {
+        format!("Eigenvalues {conditioned}.")
+    } else {
+        let (movable, all) = (part.a.nrows(), part.coordinates.ncols());
+        format!("{movable} of {all} eigenvalues {conditioned}; no gain moves the others.")
+    };
     let result = |placement: &Placement| GainResult {
         required: required.to_vec(),
-        quality: Some(placement.quality),
-        ..unique(placement.gain.clone(), method.to_owned())
+        quality: is_whole.then_some(placement.quality),
+        ..unique(placement.gain.clone(), method.clone())
     };
     let candidates = alternatives.candidates().map(|gains| gains.into_iter().map(result).collect());
     let standard = alternatives.standard.each_ref();
@@ -188,26 +190,6 @@ fn assigned(alternatives: &Alternatives, required: &[Complex<f64>]) -> GainResul
         choice: Some(Box::new(GainChoice { candidates, standard })),
         ..result(&alternatives.chosen)
     }
-}
-
-/// Returns the results of an assignment of the movable part, without the quality, which holds for this part alone.
-fn partly_assigned(
-    alternatives: &Alternatives,
-    required: &[Complex<f64>],
-    part: &ControllablePart,
-) -> GainResult {
-    let (movable, all) = (part.a.nrows(), part.coordinates.ncols());
-    let method = format!(
-        "{movable} of {all} eigenvalues assigned, with eigenvectors as well-conditioned as was found; no gain moves \
-         the others."
-    );
-    let named = |choice: GainResult| GainResult { method: method.clone(), quality: None, ..choice };
-    let mut result = named(assigned(alternatives, required));
-    if let Some(choice) = &mut result.choice {
-        let candidates = std::mem::take(&mut choice.candidates);
-        choice.candidates = candidates.map(|results| results.into_iter().map(named).collect());
-    }
-    result
 }
 
 fn weighted(gain: DMatrix<f64>, method: &str, residual: f64) -> GainResult {
