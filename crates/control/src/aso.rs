@@ -219,15 +219,17 @@ impl ExtendedPlant {
             domain: Domain::Continuous,
         };
         let (gains, [controller, observer]) = candidates.best()?;
-        let cancellation_residual = cancellation_residual(plant, *states, &k_f);
+        let cancellation_residual = self.cancellation_residual(&k_f);
         Ok(AsoDesign { gains, cancellation_residual, controller, observer })
     }
-}
 
-/// Norm of the first `states` rows of B `K_f` + `F_a`, divided by the norm of the first `states` rows of `F_a` unless
-/// that norm is zero.
-fn cancellation_residual(plant: &FaultyPlant, states: usize, k_f: &DMatrix<f64>) -> f64 {
-    let size = plant.f_a.rows(0, states).norm();
-    let residual = (&plant.b * k_f + &plant.f_a).rows(0, states).norm();
-    if size > 0.0 { residual / size } else { residual }
+    /// The part of the effect of the faults that `k_f`, m x q, does not compensate, see
+    /// [`AsoDesign::cancellation_residual`].
+    #[must_use]
+    pub fn cancellation_residual(&self, k_f: &DMatrix<f64>) -> f64 {
+        let Self { plant, states, .. } = self;
+        let size = plant.f_a.rows(0, *states).norm();
+        let residual = (&plant.b * k_f + &plant.f_a).rows(0, *states).norm();
+        if size > 0.0 { residual / size } else { residual }
+    }
 }

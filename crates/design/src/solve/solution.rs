@@ -156,7 +156,8 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<SolveResult, crat
     };
     let tracking = problem.solve()?;
     let solution = Solution {
-        cancellation_residual: cancellation_residual(&extended)?,
+        cancellation_residual: extended
+            .cancellation_residual(&extended.plant.compensation_gain()?),
         instability_before: instability_before(file, &gains, &plant, domain)?,
         instability,
         monitor: file.monitor,
@@ -265,15 +266,6 @@ fn in_domain(
     }
     plant.check_detectable(domain).map_err(refuse)?;
     Ok((domain, plant))
-}
-
-/// Returns the part of the faults' effect on the states of the plant that the compensation leaves, relative to this
-/// effect; 0 without an effect.
-fn cancellation_residual(extended: &ExtendedPlant) -> Result<f64, Error> {
-    let ExtendedPlant { plant, states, .. } = extended;
-    let left = &plant.b * plant.compensation_gain()? + &plant.f_a;
-    let whole = plant.f_a.rows(0, *states).norm();
-    Ok(if whole > 0.0 { left.rows(0, *states).norm() / whole } else { 0.0 })
 }
 
 /// Returns the loop of a plant and a controller, in the time domain of the controller.
