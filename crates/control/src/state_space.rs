@@ -69,8 +69,13 @@ impl StateSpace {
         Self { a: matrix, b, c, d: self.d.clone(), domain: self.domain }
     }
 
-    /// The system from one input to one output.
-    pub(crate) fn path(&self, output: usize, input: usize) -> Self {
+    /// The system from one input to one output, both counted from zero.
+    ///
+    /// # Panics
+    ///
+    /// If the system has no such output or input.
+    #[must_use]
+    pub fn path(&self, output: usize, input: usize) -> Self {
         Self {
             a: self.a.clone(),
             b: self.b.columns(input, 1).into(),

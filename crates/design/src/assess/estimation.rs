@@ -84,20 +84,16 @@ impl<'a> Errors<'a> {
         let Solution { plant, extended, law, linear, .. } = self.designed;
         let (fault, channel) = (&linear.faults[at], extended.channels[at]);
         let row = 2 * plant.a.nrows() + channel.estimate;
-        let to_error = |system: &StateSpace| StateSpace {
-            b: system.b.columns(channel.estimate, 1).into(),
-            c: system.c.rows(row, 1).into(),
-            d: system.d.view((row, channel.estimate), (1, 1)).into(),
-            ..system.clone()
-        };
-        let of_fault = to_error(&self.of_faults);
+        let of_fault = self.of_faults.path(row, channel.estimate);
         let step = step_response(&of_fault, 0)?;
         let transient = step.transient(0, SETTLED);
         // A ramp of f is a constant f', which a ramp model follows without lag.
         let ramp = match (law.leaks(), channel.rate) {
             (true, _) => None,
             (false, Some(_)) => Some(0.0),
-            (false, None) => Some(settled_output(&to_error(&self.of_rates), 0)?[0].abs()),
+            (false, None) => {
+                Some(settled_output(&self.of_rates.path(row, channel.estimate), 0)?[0].abs())
+            }
         };
         let point = frequency_response(&of_fault, &[self.frequency])?;
         let gain = peak_gain(&of_fault, WIDTH)?;

@@ -97,7 +97,11 @@ pub(crate) fn check_detectable(
              {measurements} cannot tell a {} of {} from {}",
             hidden.rank,
             hidden.expected,
-            if hidden.at == Complex::from(linear.domain.constant()) { "constant value" } else { "change" },
+            if hidden.at == Complex::from(linear.domain.constant()) {
+                "constant value"
+            } else {
+                "change"
+            },
             distinguished.join(", "),
             from,
         );

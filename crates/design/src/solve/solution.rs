@@ -156,8 +156,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<SolveResult, crat
     };
     let tracking = problem.solve()?;
     let solution = Solution {
-        cancellation_residual: extended
-            .cancellation_residual(&extended.plant.compensation_gain()?),
+        cancellation_residual: extended.cancellation_residual(&extended.plant.compensation_gain()?),
         instability_before: instability_before(file, &gains, &plant, domain)?,
         instability,
         monitor: file.monitor,
