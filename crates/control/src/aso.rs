@@ -35,7 +35,7 @@ use crate::controller::controller;
 use crate::faults::ExtendedPlant;
 use crate::placement::{Alternatives, Placement, Quality, alternatives, alternatives_balanced};
 use crate::robustness::{Loop, least_sensitive};
-use crate::{Domain, Error, StateSpace, check};
+use crate::{Domain, Error, check};
 use nalgebra::{Complex, DMatrix};
 
 /// A designed controller and the quality of the design.
@@ -120,10 +120,8 @@ impl GainCandidates<'_> {
     /// The loop of the plant and the controller with the gains of `feedback` and `observer`.
     fn closed(&self, feedback: &Placement, observer: &Placement) -> Result<Loop, Error> {
         let Self { plant, domain, .. } = *self;
-        let d = DMatrix::zeros(plant.c.nrows(), plant.b.ncols());
-        let FaultyPlant { a, b, c, .. } = plant.clone();
         let gains = self.gains(feedback, observer);
-        Loop::new(StateSpace { a, b, c, d, domain }, controller(plant, &gains, domain)?)
+        Loop::new(plant.commanded(domain), controller(plant, &gains, domain)?)
     }
 }
 

@@ -190,8 +190,7 @@ fn weight(
     }
     let m = b.ncols();
     let point = |c: &DMatrix<f64>| -> Result<FrequencyPoint, Error> {
-        let d = DMatrix::zeros(c.nrows(), m);
-        let system = StateSpace { a: a.clone(), b: b.clone(), c: c.clone(), d, domain };
+        let system = StateSpace::strictly_proper(a.clone(), b.clone(), c.clone(), domain);
         frequency_response(&system, &[bandwidth])
             .or_else(|_| frequency_response(&system, &[DETUNING * bandwidth]))
             .map(|mut points| points.remove(0))

@@ -3,7 +3,7 @@
 use crate::balance::unit_columns;
 use crate::blocks::block_2x2;
 use crate::svd::Svd;
-use crate::{Error, check};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
 /// Singular values of B, its columns scaled to length one, below this fraction of the largest count as zero.
@@ -38,6 +38,12 @@ impl FaultyPlant {
     ) -> Self {
         let a_f = DMatrix::zeros(f_a.ncols(), f_a.ncols());
         Self { a, b, c, f_a, a_f }
+    }
+
+    /// The plant from the commands to the measurements, {A, B, C, 0}.
+    #[must_use]
+    pub fn commanded(&self, domain: Domain) -> StateSpace {
+        StateSpace::strictly_proper(self.a.clone(), self.b.clone(), self.c.clone(), domain)
     }
 
     /// Checks shapes and finiteness of the five matrices.

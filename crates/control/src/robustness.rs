@@ -96,13 +96,8 @@ pub fn held_plant(plant: &StateSpace, period: f64) -> Result<StateSpace, Error> 
 fn with_previous_command(plant: StateSpace) -> StateSpace {
     let StateSpace { a, b, c, d, domain } = plant;
     let (n, m) = b.shape();
-    StateSpace {
-        a: a.resize(n + m, n + m, 0.0),
-        b: stacked(&b, &DMatrix::identity(m, m)),
-        c: beside(&c, &d),
-        d: DMatrix::zeros(c.nrows(), m),
-        domain,
-    }
+    let b = stacked(&b, &DMatrix::identity(m, m));
+    StateSpace::strictly_proper(a.resize(n + m, n + m, 0.0), b, beside(&c, &d), domain)
 }
 
 /// The loop y = G u, u = K y of a plant G and a controller K, at least one of them strictly proper.
@@ -217,8 +212,7 @@ impl Loop {
             Point::Input => input,
             Point::Output => output,
         });
-        let d = DMatrix::zeros(c.nrows(), b.ncols());
-        StateSpace { a: self.dynamics(), b, c, d, domain: self.plant.domain }
+        StateSpace::strictly_proper(self.dynamics(), b, c, self.plant.domain)
     }
 
     /// The system from noise that is added to the measurements to another output of the controller.

@@ -43,6 +43,18 @@ pub struct StateSpace {
 }
 
 impl StateSpace {
+    /// The system {A, B, C, 0}.
+    #[must_use]
+    pub fn strictly_proper(
+        a: DMatrix<f64>,
+        b: DMatrix<f64>,
+        c: DMatrix<f64>,
+        domain: Domain,
+    ) -> Self {
+        let d = DMatrix::zeros(c.nrows(), b.ncols());
+        Self { a, b, c, d, domain }
+    }
+
     /// Checks shapes and finiteness of the four matrices, and the period.
     ///
     /// # Errors

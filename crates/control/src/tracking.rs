@@ -187,13 +187,7 @@ pub fn feedforward(
 ) -> Result<DMatrix<f64>, Error> {
     let [n, m, t] = sizes(a, b, output)?;
     check::shape("K_x", k_x, (m, n))?;
-    let controlled = StateSpace {
-        a: a + b * k_x,
-        b: b.clone(),
-        c: output.clone(),
-        d: DMatrix::zeros(t, m),
-        domain,
-    };
+    let controlled = StateSpace::strictly_proper(a + b * k_x, b.clone(), output.clone(), domain);
     crate::stability::require_stable("A + B K_x", &controlled.a, domain)?;
     let constant = controlled.dc_matrix().lu();
     let gain = |input: &DMatrix<f64>| {

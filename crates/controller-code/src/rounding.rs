@@ -197,13 +197,9 @@ fn residual_states(controller: &Controller) -> Result<DMatrix<f64>, Error> {
         let (Some(a), Some(b)) = (Matrix::ResidualA.of(controller), b.of(controller)) else {
             continue;
         };
-        let system = StateSpace {
-            a: a.clone(),
-            b: b.clone(),
-            c: DMatrix::identity(k, k),
-            d: DMatrix::zeros(k, b.ncols()),
-            domain: Domain::Sampled { period: controller.sample_time },
-        };
+        let domain = Domain::Sampled { period: controller.sample_time };
+        let unit = DMatrix::identity(k, k);
+        let system = StateSpace::strictly_proper(a.clone(), b.clone(), unit, domain);
         let gain = peak_gain(&system, WIDTH)?.upper;
         all.columns_mut(first_signal(kind, controller), b.ncols()).copy_from(&gain);
     }

@@ -74,13 +74,9 @@ impl Reach {
         let dynamics = self.controllable.reached_dynamics().transpose();
         let observable = Staircase::new(&dynamics, &c)?;
         let (b, _) = observable.reached_output(&b);
-        Ok(Some(StateSpace {
-            a: observable.reached_dynamics().transpose(),
-            b,
-            c: observable.reached_input(&c).transpose(),
-            d: DMatrix::zeros(1, 1),
-            domain,
-        }))
+        let a = observable.reached_dynamics().transpose();
+        let c = observable.reached_input(&c).transpose();
+        Ok(Some(StateSpace::strictly_proper(a, b, c, domain)))
     }
 }
 

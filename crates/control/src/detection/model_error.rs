@@ -107,8 +107,7 @@ impl UncertainPlant {
         let [size_a, size_b, size_c] = &self.sizes;
         let (n, m) = b.shape();
         let unit = DMatrix::identity(n, n);
-        let (inputs, d) = (beside(b, &unit), DMatrix::zeros(n, m + n));
-        let states = StateSpace { a: a.clone(), b: inputs, c: unit, d, domain: *domain };
+        let states = StateSpace::strictly_proper(a.clone(), beside(b, &unit), unit, *domain);
         let gains = peak_gain(&states, WIDTH)?.upper;
         let (from_u, from_w) = (gains.columns(0, m), gains.columns(m, n));
         let feedback = from_w * size_a;

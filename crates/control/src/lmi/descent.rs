@@ -2,11 +2,10 @@
 
 use super::limit;
 use super::region::Region;
-use super::synthesis::strictly_proper;
-use crate::Domain;
 use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
 use crate::response::h_infinity;
+use crate::{Domain, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
 const ITERATIONS: usize = 80;
@@ -45,7 +44,7 @@ impl GainNorm<'_> {
         let (n, order) = (gain.nrows(), self.a.nrows());
         let wide = gain.clone().resize_vertically(order, 0.0);
         let (a, b) = (self.a - &wide * self.c, self.b - &wide * self.d);
-        let system = strictly_proper(a, b, self.e.clone(), self.domain);
+        let system = StateSpace::strictly_proper(a, b, self.e.clone(), self.domain);
         let first = system.a.view((0, 0), (n, n)).into_owned();
         if !self.region.violated(&eigenvalues(&first).ok()?, self.domain).is_empty() {
             return None;

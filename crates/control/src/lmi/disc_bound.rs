@@ -172,11 +172,10 @@ fn slowest_rate(disc: Disc, decay: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::noiseless::tests::{filtered_fault, matrix, without_noise};
-    use super::super::synthesis::strictly_proper;
     use super::*;
-    use crate::Domain;
     use crate::response::h_infinity;
     use crate::robustness::random_deviations;
+    use crate::{Domain, StateSpace};
 
     /// The gain of Ackermann's formula.
     fn placed(a: &DMatrix<f64>, c: &DMatrix<f64>, poles: &[Complex<f64>]) -> DMatrix<f64> {
@@ -199,7 +198,7 @@ mod tests {
 
     fn norm(a: DMatrix<f64>, performance: &Performance) -> f64 {
         let (b, c) = (performance.disturbance.clone(), performance.output.clone());
-        h_infinity(&strictly_proper(a, b, c, Domain::Continuous), 1e-4).unwrap().lower
+        h_infinity(&StateSpace::strictly_proper(a, b, c, Domain::Continuous), 1e-4).unwrap().lower
     }
 
     /// Random eigenvalues in a disc; the norm nearest to the bound is that of eigenvalues at the far end of the disc.

@@ -147,17 +147,6 @@ pub(super) struct Bound<'a> {
     output: DMatrix<f64>,
 }
 
-/// The system {A, B, C, 0}.
-pub(super) fn strictly_proper(
-    a: DMatrix<f64>,
-    b: DMatrix<f64>,
-    c: DMatrix<f64>,
-    domain: Domain,
-) -> StateSpace {
-    let d = DMatrix::zeros(c.nrows(), b.ncols());
-    StateSpace { a, b, c, d, domain }
-}
-
 /// Proves region and bound for the closed loop with a candidate gain.
 ///
 /// Each certificate is computed in the coordinates of the candidate and, if that fails, in coordinates that suit the
@@ -179,7 +168,7 @@ pub(super) fn prove(
     let Some(Bound { performance: &Performance { norm, gamma, .. }, input, output }) = bound else {
         return Ok(Outcome::Optimal(Synthesis { gain, region, bound: None }));
     };
-    let system = strictly_proper(dynamics.clone(), input, output, domain);
+    let system = StateSpace::strictly_proper(dynamics.clone(), input, output, domain);
     let is_met = |bound: &GainBound| bound.gamma <= gamma.unwrap_or(f64::INFINITY);
     let bound = match gain::certify_in(coordinates, &system, norm)?.optimal().filter(is_met) {
         None => certify_gain(&system, norm)?.optimal().filter(is_met),

@@ -3,7 +3,7 @@
 use super::descent::GainNorm;
 use super::observer::{Candidate, ObserverRequirements, WeightedDynamics};
 use super::region::{Region, certify_region};
-use super::synthesis::{prove, strictly_proper};
+use super::synthesis::prove;
 use super::{Outcome, Performance, Synthesis, certify_gain, observer_gain};
 use crate::blocks::symmetric_part;
 use crate::riccati::kalman;
@@ -68,7 +68,7 @@ impl ChannelWeights {
     ) -> (DMatrix<f64>, DMatrix<f64>, Performance) {
         let Performance { disturbance, output, feedthrough, .. } = performance;
         let (b, e) = (disturbance.clone(), output.clone());
-        let plain = strictly_proper(a.clone(), b, e, self.input.domain);
+        let plain = StateSpace::strictly_proper(a.clone(), b, e, self.input.domain);
         let StateSpace { a, b, c: e, .. } = self.around(&plain);
         let measured = grid(&[&[
             c,
@@ -164,8 +164,8 @@ impl ChannelWeights {
             return Ok(Outcome::Inconclusive("no gain that keeps the bound was found"));
         }
         let b = &performance.disturbance - &synthesis.gain * &performance.feedthrough;
-        let closed =
-            strictly_proper(a - &synthesis.gain * c, b, performance.output.clone(), domain);
+        let (a, c) = (a - &synthesis.gain * c, performance.output.clone());
+        let closed = StateSpace::strictly_proper(a, b, c, domain);
         let bound = certify_gain(&self.around(&closed), performance.norm)?.optimal();
         let bound = bound.filter(|bound| bound.gamma <= LOOSE * reached);
         Ok(Outcome::Optimal(Synthesis { bound, ..synthesis }))
@@ -259,7 +259,7 @@ mod tests {
             let (a, c) = (row(&[a]), row(&[1.0]));
             let norm = |gain: f64| {
                 let b = &performance.disturbance - &performance.feedthrough * gain;
-                let closed = strictly_proper(&a - row(&[gain]), b, row(&[1.0]), domain);
+                let closed = StateSpace::strictly_proper(&a - row(&[gain]), b, row(&[1.0]), domain);
                 h_infinity(&weights.around(&closed), 1e-4).map_or(f64::INFINITY, |norm| norm.upper)
             };
             let best = (0..400).map(|k| norm(1e-3 * 1.03_f64.powi(k))).fold(f64::MAX, f64::min);
@@ -288,7 +288,7 @@ mod tests {
         let Outcome::Optimal(Synthesis { gain, .. }) = outcome.unwrap() else { panic!() };
         let expected = 3.0 * (gain[0].powi(-2) + 4.0).sqrt();
         let b = &performance.disturbance - &gain * &performance.feedthrough;
-        let closed = strictly_proper(-&gain, b, row(&[1.0]), domain);
+        let closed = StateSpace::strictly_proper(-&gain, b, row(&[1.0]), domain);
         let norm = h_infinity(&weights.around(&closed), 1e-6).unwrap().upper;
         assert!((norm / expected - 1.0).abs() < 1e-5 && gain[0] > 1.0, "{norm} {expected}");
     }

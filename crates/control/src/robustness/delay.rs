@@ -178,13 +178,9 @@ fn stable_delay(
 ) -> Result<f64, Error> {
     let m = plant.b.ncols();
     let [a, old, new] = hold_late(plant, period, part)?;
-    let late = StateSpace {
-        a: beside(&a, &old).resize_vertically(a.nrows() + m, 0.0),
-        b: stacked(&new, &DMatrix::identity(m, m)),
-        c: beside(&plant.c, &plant.d),
-        d: DMatrix::zeros(plant.c.nrows(), m),
-        domain: controller.domain,
-    };
+    let a = beside(&a, &old).resize_vertically(a.nrows() + m, 0.0);
+    let (b, c) = (stacked(&new, &DMatrix::identity(m, m)), beside(&plant.c, &plant.d));
+    let late = StateSpace::strictly_proper(a, b, c, controller.domain);
     match delay_margin(&Loop::new(late, controller.clone())?) {
         Err(Error::NotSchur { .. }) => Ok(f64::NEG_INFINITY),
         delay => Ok(part + (delay? / period).floor()),

@@ -170,15 +170,10 @@ impl Examination<'_> {
 /// Returns the H2 norms from white noise on the commands, before a loss, to the measurements of the closed loop.
 fn noise(designed: &Solution, closed_loop: &DMatrix<f64>) -> Result<Vec<f64>, Error> {
     let Solution { linear, plant, domain, .. } = designed;
-    let (p, order) = (linear.c.nrows(), closed_loop.nrows());
+    let order = closed_loop.nrows();
     let b = plant.b.clone().resize_vertically(order, 0.0);
-    let system = StateSpace {
-        a: closed_loop.clone(),
-        d: DMatrix::zeros(p, b.ncols()),
-        b,
-        c: linear.c.clone().resize_horizontally(order, 0.0),
-        domain: *domain,
-    };
+    let c = linear.c.clone().resize_horizontally(order, 0.0);
+    let system = StateSpace::strictly_proper(closed_loop.clone(), b, c, *domain);
     Ok(energy(&system)?.peaks)
 }
 

@@ -114,6 +114,5 @@ fn method(bandwidth: &Bandwidth, name: &str, loop_gain: f64, residual: f64) -> S
 /// Returns the plant from `b` to `c` with the first states of `a`, as many as `b` has rows.
 fn plant(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>, domain: Domain) -> StateSpace {
     let n = b.nrows();
-    let (d, a) = (DMatrix::zeros(c.nrows(), b.ncols()), a.view((0, 0), (n, n)).into_owned());
-    StateSpace { a, b: b.clone(), c: c.clone(), d, domain }
+    StateSpace::strictly_proper(a.view((0, 0), (n, n)).into(), b.clone(), c.clone(), domain)
 }

@@ -227,13 +227,9 @@ impl ObserverProblem<'_> {
         performance: &Performance,
         domain: Domain,
     ) -> StateSpace {
-        StateSpace {
-            a: self.a_0 - gain * output,
-            b: &performance.disturbance - gain * &performance.feedthrough,
-            c: performance.output.clone(),
-            d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
-            domain,
-        }
+        let a = self.a_0 - gain * output;
+        let b = &performance.disturbance - gain * &performance.feedthrough;
+        StateSpace::strictly_proper(a, b, performance.output.clone(), domain)
     }
 
     /// Returns A, C and the performance of [`Self::performance`], extended by the states of the weights, if there are
@@ -341,12 +337,10 @@ impl FeedbackProblem<'_> {
                 }
             },
             weights: weights.as_ref(),
-            system: &|gain, performance| StateSpace {
-                a: self.a + self.b * gain,
-                b: performance.disturbance.clone(),
-                c: &performance.output + &performance.feedthrough * gain,
-                d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
-                domain,
+            system: &|gain, performance| {
+                let a = self.a + self.b * gain;
+                let c = &performance.output + &performance.feedthrough * gain;
+                StateSpace::strictly_proper(a, performance.disturbance.clone(), c, domain)
             },
             performance,
             unweighted: self.performance(plain),

@@ -6,7 +6,7 @@ use control::robustness::{Loop, least_sensitive};
 use nalgebra::DMatrix;
 
 use crate::solve::gain::GainResult;
-use crate::solve::tracking::{DesignLoop, LoopModel, commanded};
+use crate::solve::tracking::{DesignLoop, LoopModel};
 
 impl LoopModel<'_> {
     /// Returns feedback and observer whose loop has the lowest peaks of S, see [`least_sensitive`]; a single pair is
@@ -41,6 +41,6 @@ impl LoopModel<'_> {
 
     fn closed(self, gains: &Gains) -> Result<Loop, Error> {
         let DesignLoop { plant, controller } = self.design_loop(gains)?;
-        Loop::new(commanded(plant, self.domain), controller)
+        Loop::new(plant.commanded(self.domain), controller)
     }
 }

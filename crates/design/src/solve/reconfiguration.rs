@@ -20,7 +20,7 @@ use crate::solve::fallback::Fallback;
 use crate::solve::gain::{FeedbackProblem, GainChoice, Refusal};
 use crate::solve::gains::feedback;
 use crate::solve::solution::Solution;
-use crate::solve::tracking::{commanded, decay};
+use crate::solve::tracking::decay;
 use plant_file::PlantFile;
 use plant_file::faults::EntryPoint;
 use plant_file::reconfiguration::ReconfigurationRequest;
@@ -231,7 +231,7 @@ impl Without<'_> {
         reduced.b = self.without_columns(&plant.b);
         let reduced_gains = Gains { k_x: k_x.clone(), k_f: k_f.clone(), ..gains.clone() };
         let controller = controller(&reduced, &reduced_gains, *domain)?;
-        Loop::new(commanded(reduced, *domain), controller)
+        Loop::new(reduced.commanded(*domain), controller)
     }
 
     /// Examines the loop with the fall-back in this case; the observer knows that the actuators are gone.

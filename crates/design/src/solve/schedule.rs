@@ -104,8 +104,7 @@ impl Point {
         if let Domain::Sampled { period } = solution.domain {
             (a, b) = zero_order_hold(&a, &b, period)?;
         }
-        let d = DMatrix::zeros(linear.c.nrows(), b.ncols());
-        let physical = StateSpace { a, b, c: linear.c.clone(), d, domain: solution.domain };
+        let physical = StateSpace::strictly_proper(a, b, linear.c.clone(), solution.domain);
         Ok(Self { physical, model: solution.plant.clone(), gains: solution.gains.clone() })
     }
 

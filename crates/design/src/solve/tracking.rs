@@ -274,13 +274,6 @@ pub(crate) struct DesignLoop {
     pub(crate) controller: StateSpace,
 }
 
-/// Returns a plant from its commands to its measurements, without a direct term.
-pub(crate) fn commanded(plant: FaultyPlant, domain: Domain) -> StateSpace {
-    let FaultyPlant { a, b, c, .. } = plant;
-    let d = DMatrix::zeros(c.nrows(), b.ncols());
-    StateSpace { a, b, c, d, domain }
-}
-
 /// Plant, filter and time domain for which a loop is computed.
 #[derive(Clone, Copy)]
 pub(crate) struct LoopModel<'a> {
