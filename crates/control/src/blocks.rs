@@ -11,9 +11,7 @@ pub(crate) type ComplexMatrix = DMatrix<Complex<f64>>;
 /// If the numbers of columns differ.
 #[must_use]
 pub fn stacked<T: ComplexField>(above: &DMatrix<T>, below: &DMatrix<T>) -> DMatrix<T> {
-    let mut both = above.clone().resize_vertically(above.nrows() + below.nrows(), T::zero());
-    both.rows_mut(above.nrows(), below.nrows()).copy_from(below);
-    both
+    grid(&[&[above], &[below]])
 }
 
 /// The matrix [left, right] of two matrices with the same number of rows.
@@ -23,9 +21,7 @@ pub fn stacked<T: ComplexField>(above: &DMatrix<T>, below: &DMatrix<T>) -> DMatr
 /// If the numbers of rows differ.
 #[must_use]
 pub fn beside<T: ComplexField>(left: &DMatrix<T>, right: &DMatrix<T>) -> DMatrix<T> {
-    let mut both = left.clone().resize_horizontally(left.ncols() + right.ncols(), T::zero());
-    both.columns_mut(left.ncols(), right.ncols()).copy_from(right);
-    both
+    grid(&[&[left, right]])
 }
 
 /// [a, b; c, d], whose blocks may have any fitting shapes.
@@ -33,12 +29,24 @@ pub(crate) fn block_2x2<T: ComplexField>(
     [a, b]: [&DMatrix<T>; 2],
     [c, d]: [&DMatrix<T>; 2],
 ) -> DMatrix<T> {
-    let ((rows, cols), (below, right)) = (a.shape(), d.shape());
-    let mut whole = DMatrix::zeros(rows + below, cols + right);
-    whole.view_mut((0, 0), (rows, cols)).copy_from(a);
-    whole.view_mut((0, cols), (rows, right)).copy_from(b);
-    whole.view_mut((rows, 0), (below, cols)).copy_from(c);
-    whole.view_mut((rows, cols), (below, right)).copy_from(d);
+    grid(&[&[a, b], &[c, d]])
+}
+
+/// The matrix of the given blocks, row by row. Panics if the blocks of a row differ in height or the rows in length.
+pub(crate) fn grid<T: ComplexField>(rows: &[&[&DMatrix<T>]]) -> DMatrix<T> {
+    let height = rows.iter().map(|row| row[0].nrows()).sum();
+    let width = rows[0].iter().map(|block| block.ncols()).sum();
+    let mut whole = DMatrix::zeros(height, width);
+    let mut top = 0;
+    for row in rows {
+        let (mut left, row_height) = (0, row[0].nrows());
+        for block in *row {
+            whole.view_mut((top, left), (row_height, block.ncols())).copy_from(block);
+            left += block.ncols();
+        }
+        assert_eq!(left, width, "the rows of blocks differ in length");
+        top += row_height;
+    }
     whole
 }
 

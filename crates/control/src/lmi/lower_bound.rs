@@ -5,9 +5,8 @@ use super::coordinates::{time_unit, unit_near};
 use super::definite::margin;
 use super::noiseless::check_observer;
 use super::region::MARGIN;
-use super::weighted::grid;
 use super::{Performance, Problem};
-use crate::blocks::symmetric_part;
+use crate::blocks::{beside, symmetric_part};
 use crate::rank::controllable_part;
 use crate::riccati::kalman;
 use crate::{Domain, Error, check};
@@ -197,7 +196,7 @@ impl HiddenDisturbance {
 
     /// The next state or the derivative of the state, as [A, B] times [x; d].
     fn next(&self) -> DMatrix<f64> {
-        grid(&[&[&self.a, &self.b]])
+        beside(&self.a, &self.b)
     }
 
     /// The growth of X in the covariance [X, Y'; Y, U] of (x, d): A X + X A' + B Y + Y' B'; in sampled time

@@ -5,7 +5,7 @@ use super::observer::{Candidate, ObserverRequirements, WeightedDynamics};
 use super::region::{Region, certify_region};
 use super::synthesis::prove;
 use super::{Outcome, Performance, Synthesis, certify_gain, observer_gain};
-use crate::blocks::symmetric_part;
+use crate::blocks::{grid, symmetric_part};
 use crate::riccati::kalman;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
@@ -195,23 +195,6 @@ impl ChannelWeights {
             Ok(Outcome::Optimal(Synthesis { gain, ..synthesis }))
         })
     }
-}
-
-/// The matrix of the given blocks, row by row.
-pub(super) fn grid(rows: &[&[&DMatrix<f64>]]) -> DMatrix<f64> {
-    let height = rows.iter().map(|row| row[0].nrows()).sum();
-    let width = rows[0].iter().map(|block| block.ncols()).sum();
-    let mut whole = DMatrix::zeros(height, width);
-    let mut top = 0;
-    for row in rows {
-        let mut left = 0;
-        for block in *row {
-            whole.view_mut((top, left), block.shape()).copy_from(block);
-            left += block.ncols();
-        }
-        top += row[0].nrows();
-    }
-    whole
 }
 
 /// The first n rows of the gain L of the Kalman filter; None if there is no such filter.
