@@ -50,6 +50,18 @@ pub(crate) fn grid<T: ComplexField>(rows: &[&[&DMatrix<T>]]) -> DMatrix<T> {
     whole
 }
 
+/// The block diagonal matrix of the given blocks, of any shapes.
+pub(crate) fn block_diagonal<'a>(
+    blocks: impl IntoIterator<Item = &'a DMatrix<f64>>,
+) -> DMatrix<f64> {
+    blocks.into_iter().fold(DMatrix::zeros(0, 0), |whole, block| {
+        let ((top, left), size) = (whole.shape(), block.shape());
+        let mut whole = whole.resize(top + size.0, left + size.1, 0.0);
+        whole.view_mut((top, left), size).copy_from(block);
+        whole
+    })
+}
+
 /// The symmetric part (M + M') / 2.
 pub(crate) fn symmetric_part(m: &DMatrix<f64>) -> DMatrix<f64> {
     (m + m.transpose()) * 0.5

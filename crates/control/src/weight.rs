@@ -1,5 +1,6 @@
 //! Weights over frequency: constants, stable transfer functions of order 1 and 2 without zeros in the right half plane.
 
+use crate::blocks::block_diagonal;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
 use std::iter::successors;
@@ -153,24 +154,14 @@ impl Weight {
 /// Same as [`Weight::system`].
 pub fn diagonal(weights: &[Weight], domain: Domain) -> Result<StateSpace, Error> {
     let systems = weights.iter().map(|one| one.system(domain)).collect::<Result<Vec<_>, _>>()?;
-    let (order, count) = (systems.iter().map(|one| one.a.nrows()).sum(), systems.len());
-    let mut whole = StateSpace {
-        a: DMatrix::zeros(order, order),
-        b: DMatrix::zeros(order, count),
-        c: DMatrix::zeros(count, order),
-        d: DMatrix::zeros(count, count),
+    let part = |of: fn(&StateSpace) -> &DMatrix<f64>| block_diagonal(systems.iter().map(of));
+    Ok(StateSpace {
+        a: part(|one| &one.a),
+        b: part(|one| &one.b),
+        c: part(|one| &one.c),
+        d: part(|one| &one.d),
         domain,
-    };
-    let mut first = 0;
-    for (at, system) in systems.iter().enumerate() {
-        let n = system.a.nrows();
-        whole.a.view_mut((first, first), (n, n)).copy_from(&system.a);
-        whole.b.view_mut((first, at), (n, 1)).copy_from(&system.b);
-        whole.c.view_mut((at, first), (1, n)).copy_from(&system.c);
-        whole.d[(at, at)] = system.d[(0, 0)];
-        first += n;
-    }
-    Ok(whole)
+    })
 }
 
 /// The coefficients in z of a polynomial in p = `rate` (z - 1) / (z + 1), times (z + 1)^order.

@@ -4,7 +4,7 @@ use super::pole_block::{PoleBlock, distance};
 use super::{EXACT, PlacementProblem};
 use crate::Error;
 use crate::balance::{divide_rows, multiply_columns};
-use crate::blocks::{beside, stacked};
+use crate::blocks::{beside, block_diagonal, stacked};
 use crate::check::as_number;
 use crate::eigen::eigenvalues;
 use crate::product::AccurateProduct;
@@ -65,12 +65,7 @@ impl PlacementProblem<'_> {
         Eigenvectors { v, units, .. }: &Eigenvectors<'_>,
         blocks: impl Iterator<Item = PoleBlock>,
     ) -> Option<DMatrix<f64>> {
-        let mut m = DMatrix::<f64>::zeros(v.nrows(), v.ncols());
-        let mut first = 0;
-        for block in blocks.map(PoleBlock::block) {
-            m.view_mut((first, first), block.shape()).copy_from(&block);
-            first += block.nrows();
-        }
+        let m = block_diagonal(&blocks.map(PoleBlock::block).collect::<Vec<_>>());
         let a = divide_rows(&multiply_columns(self.a, units), units);
         let b = divide_rows(self.b, units);
         let response = AccurateProduct::new(&multiply_columns(gain, units), v);

@@ -4,7 +4,7 @@ use super::crossing::{Evaluation, narrow};
 use super::held::hold_inputs;
 use super::sweep::Sweep;
 use super::{Loop, Point, held_plant};
-use crate::blocks::{beside, block_2x2, stacked};
+use crate::blocks::{beside, block_diagonal, stacked};
 use crate::eigen::complex_eigenvalues;
 use crate::response::KnownResponse;
 use crate::stability::instability;
@@ -223,8 +223,7 @@ fn delayed(
     let mut older = DMatrix::zeros(m, order);
     older.view_mut((0, at(samples + 1)), (m, m)).fill_with_identity();
     let measured = plant.c.clone().resize_horizontally(order, 0.0) + &plant.d * &older;
-    let now = block_2x2([&a, &DMatrix::zeros(n, k)], [&DMatrix::zeros(k, n), &controller.a]);
-    let mut dynamics = now.resize(order, order, 0.0);
+    let mut dynamics = block_diagonal([&a, &controller.a]).resize(order, order, 0.0);
     let controller_rows = dynamics.rows(n, k) + &controller.b * &measured;
     dynamics.rows_mut(n, k).copy_from(&controller_rows);
     let mut command = &controller.d * &measured;
