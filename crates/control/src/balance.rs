@@ -174,6 +174,12 @@ pub(crate) fn power_of_two(x: f64) -> f64 {
     libm::ldexp(1.0, nearest)
 }
 
+/// [`power_of_two`] as a unit, by which a number of size x may be divided: 1 if x is zero, subnormal, infinite or NaN.
+pub(crate) fn power_of_two_or_one(x: f64) -> f64 {
+    let unit = power_of_two(x);
+    if unit.is_normal() { unit } else { 1.0 }
+}
+
 /// Divides the rows of M by the entries of d.
 pub(crate) fn divide_rows(m: &DMatrix<f64>, d: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / d[i])

@@ -1,7 +1,7 @@
 //! Exact discretisation of a linear system whose input is constant or linear over the step, and its inverse.
 
 use crate::balance::{
-    Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
+    Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two_or_one,
 };
 use crate::blocks::beside;
 use crate::exponential::scaling_and_squaring;
@@ -149,7 +149,7 @@ pub fn continuous(
     let balance = Balance::new(phi);
     let less_one = &balance.matrix - DMatrix::identity(n, n);
     let inputs = divide_rows(gamma, &balance.scale);
-    let relative = inputs.column_iter().map(|c| unit(c.norm() / less_one.norm()));
+    let relative = inputs.column_iter().map(|c| power_of_two_or_one(c.norm() / less_one.norm()));
     let units = DVector::from_iterator(m, relative);
     let whole = beside(&less_one, &divide_columns(&inputs, &units));
     let whole = whole.resize_vertically(n + m, 0.0);
@@ -170,7 +170,8 @@ fn integrals(
     check::positive("h", h)?;
     let balance = Balance::of_exponential(a);
     let inputs = check::in_range("B h", divide_rows(b, &balance.scale) * h)?;
-    let units = DVector::from_iterator(m, inputs.column_iter().map(|c| unit(c.norm())));
+    let units =
+        DVector::from_iterator(m, inputs.column_iter().map(|c| power_of_two_or_one(c.norm())));
     let mut block = DMatrix::zeros(n + m + slopes, n + m + slopes);
     let scaled_a = check::in_range("A h", &balance.matrix * h)?;
     block.view_mut((0, 0), (n, n)).copy_from(&scaled_a);
@@ -186,12 +187,6 @@ fn integrals(
         check::in_range("Gamma_0", gamma(n, m, 1.0))?,
         check::in_range("Gamma_1", gamma(n + m, slopes, h))?,
     ])
-}
-
-/// The power of two nearest to the norm of an input's column; 1 for no effect, and for an infinite norm.
-fn unit(norm: f64) -> f64 {
-    let power = power_of_two(norm);
-    if power.is_normal() { power } else { 1.0 }
 }
 
 /// Selects a specialised loop for up to eight states, whose columns fit into registers.

@@ -5,7 +5,7 @@
 //! time at which the sampled plant is controllable and observable.
 
 use crate::aso::{GainCandidates, place_controller};
-use crate::balance::power_of_two;
+use crate::balance::power_of_two_or_one;
 use crate::blocks::{block_2x2, stacked};
 use crate::controller::{closed_loop, controller};
 use crate::faults::{ExtendedPlant, coefficients};
@@ -278,11 +278,7 @@ fn place_dual(
         energy += DVector::from_fn(a_0.nrows(), |state, _| response.column(state).norm_squared());
         response *= a_0;
     }
-    let scale = energy.map(|energy: f64| {
-        let unit = power_of_two(1.0 / energy.sqrt());
-        if unit.is_normal() { unit } else { 1.0 }
-    });
-    let units = scale.map(|unit| 1.0 / unit);
+    let units = energy.map(|energy: f64| 1.0 / power_of_two_or_one(1.0 / energy.sqrt()));
     let (a, b) = (a_0.transpose(), output.transpose());
     let problem = PlacementProblem { a: &a, b: &b, poles, sampled: true };
     let placed = problem.alternatives(&Coordinates::Scaled(&units), extent)?;

@@ -4,7 +4,7 @@
 //! a matrix with badly scaled columns have full relative precision, and the number of iterations is bounded.
 
 use crate::Error;
-use crate::balance::power_of_two;
+use crate::balance::power_of_two_or_one;
 use crate::check::as_number;
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -35,8 +35,7 @@ impl Svd {
     /// Decomposes `m`; [`Error::NotConverged`] after 60 sweeps, and for entries that are not finite.
     pub(crate) fn new(m: &DMatrix<f64>) -> Result<Self, Error> {
         let cols = m.ncols();
-        let unit = power_of_two(m.amax());
-        let unit = if unit.is_normal() { unit } else { 1.0 };
+        let unit = power_of_two_or_one(m.amax());
         let mut images = m / unit;
         let mut right = DMatrix::identity(cols, cols);
         let negligible = NEGLIGIBLE * images.norm();

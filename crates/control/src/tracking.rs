@@ -32,7 +32,7 @@ pub use integral_feedforward::{IntegralFeedforward, integral_feedforward};
 pub use interpolated_windup::{InterpolatedWindup, interpolated_windup};
 pub use windup::windup_gain;
 
-use crate::balance::{divide_rows, multiply_columns, power_of_two};
+use crate::balance::{divide_rows, multiply_columns, power_of_two_or_one};
 use crate::blocks::{beside, block_2x2, stacked};
 use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace, check};
@@ -197,11 +197,8 @@ pub fn feedforward(
     };
     let whole = gain(&DMatrix::identity(m, m))?;
     // Units of the references in which each row of G has about length one.
-    let unit = |length: f64| match power_of_two(length) {
-        unit if unit.is_normal() => unit,
-        _ => 1.0,
-    };
-    let units = DVector::from_iterator(t, whole.row_iter().map(|row| unit(row.norm())));
+    let units = whole.row_iter().map(|row| power_of_two_or_one(row.norm()));
+    let units = DVector::from_iterator(t, units);
     let svd = Svd::new(&divide_rows(&whole, &units).transpose())?;
     let rank = svd.rank(TOLERANCE);
     // (G')^+ = (G^+)'.

@@ -6,7 +6,7 @@ use super::limit;
 use super::solver::{End, minimise};
 use super::{Outcome, Solution};
 use crate::Error;
-use crate::balance::power_of_two;
+use crate::balance::power_of_two_or_one;
 use nalgebra::{DMatrix, DVector};
 
 /// A requirement violated by less than this, relative to its largest entry, counts as neither met nor in conflict.
@@ -63,8 +63,7 @@ struct Requirement {
 impl Requirement {
     /// (S(x) - m I) / size - slack I; size is a power of two near the largest entry of S, or 1 for S = 0.
     fn semidefinite(&self, slack: Option<&Affine>) -> Affine {
-        let size = power_of_two(self.matrix.largest_entry());
-        let size = if size.is_normal() { size } else { 1.0 };
+        let size = power_of_two_or_one(self.matrix.largest_entry());
         let order = self.matrix.shape().0;
         let scaled = &self.matrix * (1.0 / size);
         let margin = Affine::identity(order, self.margin / size);

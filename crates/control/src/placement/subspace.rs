@@ -3,7 +3,7 @@
 use super::pole_block::PoleBlock;
 use crate::Error;
 use crate::balance::{
-    Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
+    Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two_or_one,
 };
 use crate::blocks::beside;
 use crate::check::as_number;
@@ -193,6 +193,5 @@ fn row_sizes(solutions: &[DMatrix<f64>], blocks: &[PoleBlock], n: usize) -> DVec
         }
     }
     let total = sizes.sum();
-    let factors = sizes.map(|size| power_of_two((size * as_number(rows) / total).sqrt()));
-    factors.map(|factor| if factor.is_normal() { factor } else { 1.0 })
+    sizes.map(|size| power_of_two_or_one((size * as_number(rows) / total).sqrt()))
 }

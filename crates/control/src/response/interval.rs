@@ -1,6 +1,6 @@
 //! Bounds of the integral of |h| over intervals of dyadic length, for an impulse response h.
 
-use crate::balance::{divide_columns, multiply_columns, power_of_two};
+use crate::balance::{divide_columns, multiply_columns, power_of_two, power_of_two_or_one};
 use crate::blocks::stacked;
 use crate::exponential::exponential;
 use crate::{Domain, Error, StateSpace, check};
@@ -203,11 +203,8 @@ fn row_after(row: &DMatrix<f64>, a: &DMatrix<f64>, part: f64) -> DMatrix<f64> {
 /// R is the triangle of a QR decomposition with pivots, of columns of length about one, because the effects of two
 /// states on an output may differ by many orders of magnitude.
 fn without_negligible_rows(m: &DMatrix<f64>) -> DMatrix<f64> {
-    let unit = |column: usize| match power_of_two(m.column(column).norm()) {
-        unit if unit.is_normal() => unit,
-        _ => 1.0,
-    };
-    let units = DVector::from_fn(m.ncols(), |column, _| unit(column));
+    let unit = |column: usize, _| power_of_two_or_one(m.column(column).norm());
+    let units = DVector::from_fn(m.ncols(), unit);
     let decomposition = divide_columns(m, &units).col_piv_qr();
     let mut root = decomposition.r();
     decomposition.p().inv_permute_columns(&mut root);
