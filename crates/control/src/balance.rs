@@ -200,16 +200,15 @@ pub(crate) fn divide_columns(m: &DMatrix<f64>, d: &DVector<f64>) -> DMatrix<f64>
     DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / d[j])
 }
 
+/// The norms of the columns; 1 for a zero column.
+pub(crate) fn column_lengths(m: &DMatrix<f64>) -> DVector<f64> {
+    let norms = DVector::from_iterator(m.ncols(), m.column_iter().map(|column| column.norm()));
+    norms.map(|norm| if norm > 0.0 { norm } else { 1.0 })
+}
+
 /// Divides each column by its norm; a zero column is not changed.
 pub(crate) fn unit_columns(m: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut scaled = m.clone();
-    for mut column in scaled.column_iter_mut() {
-        let norm = column.norm();
-        if norm > 0.0 {
-            column /= norm;
-        }
-    }
-    scaled
+    divide_columns(m, &column_lengths(m))
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ mod update_order;
 
 pub use alternatives::{Alternatives, alternatives, alternatives_balanced, alternatives_discrete};
 
-use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns};
+use crate::balance::{Balance, column_lengths, divide_columns, divide_rows, multiply_columns};
 use crate::rank::require_controllable;
 use crate::svd::Svd;
 use crate::{Error, check};
@@ -376,8 +376,7 @@ fn check_poles(poles: &[Complex<f64>], n: usize) -> Result<(), Error> {
 
 /// Columns X such that B X has orthonormal columns that span the range of B.
 fn input_basis(b: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
-    let lengths = DVector::from_iterator(b.ncols(), b.column_iter().map(|column| column.norm()));
-    let lengths = lengths.map(|length| if length > 0.0 { length } else { 1.0 });
+    let lengths = column_lengths(b);
     let unit = Svd::new(&divide_columns(b, &lengths))?;
     Ok(divide_rows(&unit.whitening(unit.rank(DEPENDENT_INPUTS)), &lengths))
 }

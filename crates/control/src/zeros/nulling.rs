@@ -1,11 +1,11 @@
 //! The motions that the outputs of a system do not show.
 
 use super::{TOLERANCE_PER_SIGNAL, reduce};
-use crate::balance::{Balance, divide_rows, multiply_columns};
+use crate::balance::{Balance, column_lengths, divide_rows, multiply_columns};
 use crate::blocks::stacked;
 use crate::svd::Svd;
 use crate::{Error, StateSpace, check};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// The motions for which y stays zero: v' = S v with w = W v and z = Z v, where v has s entries.
 pub(crate) struct Nulling {
@@ -32,9 +32,9 @@ pub(crate) fn output_nulling(
     let Balance { matrix: a, scale } = Balance::of_system(&system.a, &system.b, &system.c);
     let size = if a.norm().is_normal() { a.norm() } else { 1.0 };
     let (b, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
-    let columns = lengths(&stacked(&b, &system.d)).map(|length| size / length);
+    let columns = column_lengths(&stacked(&b, &system.d)).map(|length| size / length);
     let rows = stacked(&c.transpose(), &system.d.transpose());
-    let rows = lengths(&rows).map(|length| size / length);
+    let rows = column_lengths(&rows).map(|length| size / length);
     let signals = a.nrows() + b.ncols() + c.nrows();
     let scaled = StateSpace {
         b: multiply_columns(&b, &columns),
@@ -56,13 +56,4 @@ pub(crate) fn output_nulling(
     let input = -(DMatrix::from_diagonal(&columns) * quotient);
     let output = output + direct * &input;
     Ok(Some(Nulling { dynamics, output, input, rounding: zero }))
-}
-
-/// The lengths of the columns; 1 for a column of zeros.
-fn lengths(m: &DMatrix<f64>) -> DVector<f64> {
-    let length = |column: nalgebra::DVectorView<'_, f64>| match column.norm() {
-        length if length > 0.0 => length,
-        _ => 1.0,
-    };
-    DVector::from_iterator(m.ncols(), m.column_iter().map(length))
 }
