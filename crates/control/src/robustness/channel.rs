@@ -75,7 +75,7 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
     }
     let gain = gain_limits(&complementary.system, &limits)?;
     let (mut phase, mut phase_frequency, mut delay) = (f64::INFINITY, 0.0, f64::INFINITY);
-    for frequency in sweep.crossings(|t| modulus(t[(0, 0)]) - 1.0)? {
+    for frequency in sweep.crossings(|t| loop_modulus(t[(0, 0)]) - 1.0)? {
         let lag = (-transfer(&complementary.gain(frequency)?)).arg();
         if lag.abs() < phase {
             (phase, phase_frequency) = (lag.abs(), frequency);
@@ -92,12 +92,12 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
 }
 
 /// The loop transfer L = T / (1 - T).
-fn loop_transfer(t: Complex<f64>) -> Complex<f64> {
+pub(super) fn loop_transfer(t: Complex<f64>) -> Complex<f64> {
     t / (Complex::new(1.0, 0.0) - t)
 }
 
 /// The modulus of L; infinite at a pole of L.
-fn modulus(t: Complex<f64>) -> f64 {
+pub(super) fn loop_modulus(t: Complex<f64>) -> f64 {
     t.norm() / (Complex::new(1.0, 0.0) - t).norm()
 }
 

@@ -1,5 +1,6 @@
 //! The delay margin for a common delay in all channels.
 
+use super::channel::{loop_modulus, loop_transfer};
 use super::crossing::{Evaluation, narrow};
 use super::held::hold_inputs;
 use super::sweep::Sweep;
@@ -77,11 +78,8 @@ struct Locus {
 
 /// The eigenvalues of L = T (I - T)^-1, t / (1 - t) for each eigenvalue t of T, by ascending modulus.
 fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Locus>, Error> {
-    let one = Complex::new(1.0, 0.0);
-    let mut loci: Vec<_> = complex_eigenvalues(t)?
-        .into_iter()
-        .map(|t| Locus { value: t / (one - t), excess: t.norm() / (one - t).norm() - 1.0 })
-        .collect();
+    let locus = |t| Locus { value: loop_transfer(t), excess: loop_modulus(t) - 1.0 };
+    let mut loci: Vec<_> = complex_eigenvalues(t)?.into_iter().map(locus).collect();
     loci.sort_by(|x, y| x.excess.total_cmp(&y.excess));
     Ok(loci)
 }
