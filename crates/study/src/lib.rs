@@ -15,6 +15,7 @@ pub mod config;
 #[cfg(feature = "load")]
 mod content;
 mod error;
+mod from_toml;
 #[cfg(feature = "load")]
 mod instances;
 mod link;

@@ -3,8 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::de::{Error, Visitor};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Serialize, Serializer};
+
+use crate::from_toml::from_toml;
 
 /// Name of [`Every::Step`].
 const STEP: &str = "step";
@@ -68,31 +69,9 @@ impl Serialize for Every {
     }
 }
 
-impl<'de> Deserialize<'de> for Every {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(EveryVisitor)
-    }
-}
-
-struct EveryVisitor;
-
-impl Visitor<'_> for EveryVisitor {
-    type Value = Every;
-
-    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(EXPECTED)
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "seconds are a double")]
-    fn visit_i64<E: Error>(self, value: i64) -> Result<Every, E> {
-        Every::seconds(value as f64).map_err(E::custom)
-    }
-
-    fn visit_f64<E: Error>(self, value: f64) -> Result<Every, E> {
-        Every::seconds(value).map_err(E::custom)
-    }
-
-    fn visit_str<E: Error>(self, value: &str) -> Result<Every, E> {
-        Every::named(value).map_err(E::custom)
-    }
+from_toml! {
+    Every, EXPECTED;
+    visit_i64(value: i64) => Every::seconds(slave::to_real(value));
+    visit_f64(value: f64) => Every::seconds(value);
+    visit_str(text: &str) => Every::named(text);
 }

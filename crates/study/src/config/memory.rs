@@ -3,8 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::de::{Error, Visitor};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Serialize, Serializer};
+
+use crate::from_toml::from_toml;
 
 const EXPECTED: &str = "a number of bytes, or one with a unit, for example 512MiB or 2GiB";
 /// Names of units, with their size in bytes.
@@ -52,30 +53,11 @@ impl Serialize for Memory {
     }
 }
 
-impl<'de> Deserialize<'de> for Memory {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Amount;
-        impl Visitor<'_> for Amount {
-            type Value = Memory;
-
-            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-                formatter.write_str(EXPECTED)
-            }
-
-            fn visit_i64<E: Error>(self, bytes: i64) -> Result<Memory, E> {
-                bytes.to_string().parse().map_err(E::custom)
-            }
-
-            fn visit_u64<E: Error>(self, bytes: u64) -> Result<Memory, E> {
-                bytes.to_string().parse().map_err(E::custom)
-            }
-
-            fn visit_str<E: Error>(self, text: &str) -> Result<Memory, E> {
-                text.parse().map_err(E::custom)
-            }
-        }
-        deserializer.deserialize_any(Amount)
-    }
+from_toml! {
+    Memory, EXPECTED;
+    visit_i64(bytes: i64) => bytes.to_string().parse();
+    visit_u64(bytes: u64) => bytes.to_string().parse();
+    visit_str(text: &str) => text.parse();
 }
 
 #[cfg(test)]

@@ -3,8 +3,9 @@
 use std::fmt;
 
 use fmu_description::{Kind, ModelDescription, ScalarVariable};
-use serde::de::{Error, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::Serialize;
+
+use crate::from_toml::from_toml;
 
 /// A number, `true` or `false`, or a text.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -28,42 +29,14 @@ impl fmt::Display for Literal {
     }
 }
 
-impl<'de> Deserialize<'de> for Literal {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(LiteralVisitor)
-    }
-}
-
-struct LiteralVisitor;
-
-impl Visitor<'_> for LiteralVisitor {
-    type Value = Literal;
-
-    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str("a number, true, false or a text in quotes")
-    }
-
-    fn visit_bool<E: Error>(self, value: bool) -> Result<Literal, E> {
-        Ok(Literal::Boolean(value))
-    }
-
+from_toml! {
+    Literal, "a number, true, false or a text in quotes";
+    visit_bool(value: bool) => Ok(Literal::Boolean(value));
+    visit_i64(value: i64) => Ok(Literal::Number(slave::to_real(value)));
     #[expect(clippy::cast_precision_loss, reason = "a number of the file is a double")]
-    fn visit_i64<E: Error>(self, value: i64) -> Result<Literal, E> {
-        Ok(Literal::Number(value as f64))
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "a number of the file is a double")]
-    fn visit_u64<E: Error>(self, value: u64) -> Result<Literal, E> {
-        Ok(Literal::Number(value as f64))
-    }
-
-    fn visit_f64<E: Error>(self, value: f64) -> Result<Literal, E> {
-        Ok(Literal::Number(value))
-    }
-
-    fn visit_str<E: Error>(self, value: &str) -> Result<Literal, E> {
-        Ok(Literal::Text(value.to_owned()))
-    }
+    visit_u64(value: u64) => Ok(Literal::Number(value as f64));
+    visit_f64(value: f64) => Ok(Literal::Number(value));
+    visit_str(text: &str) => Ok(Literal::Text(text.to_owned()));
 }
 
 /// Description of the value expected for a Binary.
