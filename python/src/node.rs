@@ -6,9 +6,10 @@ use pyo3::IntoPyObjectExt as _;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use toml::Spanned;
+use serde::{Deserialize, Deserializer, Serialize};
+use study::config::Ordered;
 
 /// Largest depth of nested values that are converted.
 const DEPTH: usize = 32;
@@ -22,12 +23,7 @@ pub(crate) enum Node {
     Real(f64),
     Text(String),
     List(Vec<Node>),
-    #[serde(serialize_with = "as_map")]
-    Table(Vec<(String, Node)>),
-}
-
-fn as_map<S: Serializer>(entries: &[(String, Node)], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(entries.iter().map(|(name, value)| (name, value)))
+    Table(Ordered<Node>),
 }
 
 impl<'de> Deserialize<'de> for Node {
@@ -65,24 +61,12 @@ impl<'de> Visitor<'de> for NodeVisitor {
         Ok(Node::Text(value.to_owned()))
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Node, A::Error> {
-        let mut values = Vec::new();
-        while let Some(value) = list.next_element()? {
-            values.push(value);
-        }
-        Ok(Node::List(values))
+    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Node, A::Error> {
+        Vec::deserialize(SeqAccessDeserializer::new(list)).map(Node::List)
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Node, A::Error> {
-        // The parser returns the entries by name; their positions in the text restore the order.
-        let mut entries: Vec<(String, Spanned<Node>)> = Vec::new();
-        while let Some(entry) = map.next_entry()? {
-            entries.push(entry);
-        }
-        entries.sort_by_key(|(_, value)| value.span().start);
-        Ok(Node::Table(
-            entries.into_iter().map(|(name, value)| (name, value.into_inner())).collect(),
-        ))
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Node, A::Error> {
+        Ordered::deserialize(MapAccessDeserializer::new(map)).map(Node::Table)
     }
 }
 
@@ -127,7 +111,7 @@ impl Node {
             }
             Self::Table(entries) => {
                 let table = PyDict::new(py);
-                for (name, value) in entries {
+                for (name, value) in &entries.0 {
                     table.set_item(name, value.to_python(py)?)?;
                 }
                 Ok(table.into_any())
@@ -197,5 +181,5 @@ fn table(mapping: &Bound<'_, PyMapping>, place: &str, depth: usize) -> PyResult<
         let inner = if place.is_empty() { key.clone() } else { format!("{place}.{key}") };
         entries.push((key, convert(&value, &inner, depth + 1)?));
     }
-    Ok(Node::Table(entries))
+    Ok(Node::Table(Ordered(entries)))
 }
