@@ -45,8 +45,8 @@ pub struct ModelDescription {
     pub fmi_version: String,
     pub model_name: String,
     /// `guid`, in FMI 3.0 `instantiationToken`: the string that must be equal in the XML and in the
-    /// binary. The crate `fmu` sets it to [`ModelDescription::content_guid`], which is why the serialised
-    /// form does not contain it.
+    /// binary. The crate `fmu` sets it to [`Guid::of`] the description, which is why the serialised form
+    /// does not contain it.
     #[serde(skip)]
     pub guid: String,
     pub description: Option<String>,
