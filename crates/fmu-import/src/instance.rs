@@ -47,15 +47,15 @@ impl Instance {
     }
 }
 
-/// Calls a method of the instance, or of its field `$part`, if the FMI version of its FMU is listed. For other
+/// Calls a method of the instance, or of its part `$part`, if the FMI version of its FMU is listed. For other
 /// versions, returns the error that the C function `$absent` is missing.
 macro_rules! of_version {
     (
         $instance:ident.$method:ident $arguments:tt,
-        [$($version:ident$(.$part:ident)?),+] $($absent:literal)?
+        [$($version:ident$(.$part:ident)*),+] $($absent:literal)?
     ) => {
         match &mut $instance.inner {
-            $(Inner::$version(instance) => instance$(.$part)?.$method $arguments,)+
+            $(Inner::$version(instance) => instance$(.$part)*.$method $arguments,)+
             $(_ => Err(absent($absent)),)?
         }
     };
@@ -167,18 +167,10 @@ impl Slave for Instance {
     }
 
     fn guard_arrays(&mut self) {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.component.base.guard_arrays(),
-            Inner::V2(instance) => instance.component.base.guard_arrays(),
-            Inner::V3(instance) => instance.component.base.guard_arrays(),
-        }
+        of_version!(self.guard_arrays(), [V1.component.base, V2.component.base, V3.component.base]);
     }
 
     fn take_warning(&mut self) -> bool {
-        match &self.inner {
-            Inner::V1(instance) => instance.component.base.take_warning(),
-            Inner::V2(instance) => instance.component.base.take_warning(),
-            Inner::V3(instance) => instance.component.base.take_warning(),
-        }
+        of_version!(self.take_warning(), [V1.component.base, V2.component.base, V3.component.base])
     }
 }
