@@ -39,25 +39,23 @@ pub struct Sample {
 /// An event that the run sends to the server.
 pub(crate) enum Event {
     Sample(Sample),
-    /// A message; `fmu` is empty for a message of the run itself.
-    Message {
-        fmu: String,
-        text: String,
-    },
-    Intervention {
-        time: f64,
-        text: String,
-    },
-    Ended {
-        outcome: String,
-    },
+    Message(Message),
+    Intervention(Intervention),
+    Ended { outcome: String },
 }
 
-/// A message with the name of its FMU.
-#[derive(Clone, Serialize)]
-struct Message {
-    fmu: String,
-    text: String,
+/// A message with the name of its FMU, which is empty for a message of the run itself.
+#[derive(Serialize)]
+pub(crate) struct Message {
+    pub(crate) fmu: String,
+    pub(crate) text: String,
+}
+
+/// A change of the run at a time in s.
+#[derive(Serialize)]
+pub(crate) struct Intervention {
+    pub(crate) time: f64,
+    pub(crate) text: String,
 }
 
 /// The values of all signals at a time. Later rows have larger numbers.
@@ -92,8 +90,7 @@ pub(crate) struct Store {
     message_count: u64,
     /// Number of messages by FMU.
     counts: BTreeMap<String, u64>,
-    /// Time in s and text of each intervention.
-    interventions: Vec<(f64, String)>,
+    interventions: Vec<Intervention>,
     /// The outcome of the run, after its end.
     outcome: Option<String>,
     /// Time of the last request of a page.
@@ -111,15 +108,15 @@ impl Store {
     pub(crate) fn add(&mut self, event: Event) {
         match event {
             Event::Sample(sample) => self.add_sample(sample),
-            Event::Message { fmu, text } => {
+            Event::Message(message) => {
                 self.message_count += 1;
-                *self.counts.entry(fmu.clone()).or_default() += 1;
+                *self.counts.entry(message.fmu.clone()).or_default() += 1;
                 if self.messages.len() == MESSAGES {
                     self.messages.pop_front();
                 }
-                self.messages.push_back(Message { fmu, text });
+                self.messages.push_back(message);
             }
-            Event::Intervention { time, text } => self.interventions.push((time, text)),
+            Event::Intervention(intervention) => self.interventions.push(intervention),
             Event::Ended { outcome } => self.outcome = Some(outcome),
         }
     }
@@ -169,11 +166,6 @@ impl Store {
         let skipped = usize::try_from(query.messages_after.saturating_sub(first)).unwrap_or(0);
         let messages: Vec<&Message> = self.messages.iter().skip(skipped).collect();
         let Sample { time, steps, seconds, fallbacks, late, .. } = &self.last;
-        let interventions: Vec<_> = self
-            .interventions
-            .iter()
-            .map(|(time, text)| json!({ "time": time, "text": text }))
-            .collect();
         json!({
             "phase": phase,
             "time": time,
@@ -188,7 +180,7 @@ impl Store {
             "messages": messages,
             "counts": self.counts,
             "dropped": dropped,
-            "interventions": interventions,
+            "interventions": self.interventions,
             "outcome": self.outcome,
         })
     }
@@ -232,7 +224,7 @@ mod tests {
         let mut store = Store::new(0, 0.0);
         for number in 0..1500 {
             let fmu = if number % 3 == 0 { "plant" } else { "" }.to_owned();
-            store.add(Event::Message { fmu, text: number.to_string() });
+            store.add(Event::Message(Message { fmu, text: number.to_string() }));
         }
         let state = store.state(&Query { messages_after: 1499, ..Query::default() }, &"running", 0);
         assert_eq!(state["counts"], json!({ "": 1000, "plant": 500 }));

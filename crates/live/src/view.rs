@@ -13,7 +13,7 @@ use crate::guard::{Guard, Token};
 use crate::routes::Site;
 use crate::server;
 use crate::shared::{Phase, Shared};
-use crate::store::{Event, Sample, Store};
+use crate::store::{Event, Intervention, Message, Sample, Store};
 
 /// Largest number of events of the run that wait for the server.
 const EVENTS: usize = 4096;
@@ -32,7 +32,7 @@ pub struct Messages {
 impl Messages {
     /// Sends a message of the FMU `fmu`; the name is empty for a message that comes from no FMU.
     pub fn send(&self, fmu: &str, text: String) {
-        self.publish(Event::Message { fmu: fmu.to_owned(), text });
+        self.publish(Event::Message(Message { fmu: fmu.to_owned(), text }));
     }
 
     fn publish(&self, event: Event) {
@@ -129,7 +129,7 @@ impl View {
 
     /// Publishes an intervention at `time` in s, which is dropped and counted if the server cannot take it at once.
     pub fn intervened(&self, time: f64, text: String) {
-        self.messages.publish(Event::Intervention { time, text });
+        self.messages.publish(Event::Intervention(Intervention { time, text }));
     }
 
     /// Publishes the phase of the run.
