@@ -3,15 +3,12 @@
 use std::path::Path;
 
 use anyhow::ensure;
-use results::{Column, ColumnKind, Selection, Table};
+use results::{ColumnKind, Selection, Table};
 
-use figure::{Figure, Ink, Panel, Series, rasterise, stairs};
+use figure::{Figure, INKS, Ink, Panel, Series, rasterise, stairs};
 
 use crate::outputs;
 
-/// Colours of the curves in a panel. The number of colours limits the number of curves in a panel.
-const INKS: [Ink; 7] =
-    [Ink::Blue, Ink::Vermilion, Ink::Green, Ink::Purple, Ink::Sky, Ink::Orange, Ink::Black];
 /// Largest number of curves in a picture.
 const CURVES: usize = 64;
 
@@ -79,7 +76,7 @@ fn curves(
     let curve = |(position, envelope): (usize, results::Envelope)| {
         let column = &table.columns()[position];
         let (time, values) = envelope.samples();
-        let (time, values) = if stepwise(column) { stairs(&time, &values) } else { (time, values) };
+        let (time, values) = if column.is_held() { stairs(&time, &values) } else { (time, values) };
         let stated = || units.iter().find(|(name, _)| *name == column.name);
         let unit = column.unit.clone().or_else(|| Some(stated()?.1.clone()));
         let label = unit
@@ -88,11 +85,6 @@ fn curves(
         Curve { label, unit, time, values }
     };
     Ok(positions.into_iter().zip(envelopes).map(curve).collect())
-}
-
-/// Whether a variable is constant between two samples.
-fn stepwise(column: &Column) -> bool {
-    !matches!(column.kind, ColumnKind::Real)
 }
 
 /// Groups curves by unit into panels with at most as many curves as there are colours.

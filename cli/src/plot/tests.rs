@@ -1,7 +1,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use results::{Row, create};
+use results::{Column, Row, create};
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::roxmltree::Document;
 
@@ -129,7 +129,7 @@ fn a_switch_is_drawn_as_stairs() {
     assert_eq!(time, [0.0, 1.0, 1.0, 3.0, 3.0, 3.0]);
     assert_eq!(values, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]);
     for kind in [ColumnKind::Integer, ColumnKind::Long, ColumnKind::Boolean] {
-        assert!(stepwise(&column("ctrl.count", kind, None)), "{kind:?}");
+        assert!(column("ctrl.count", kind, None).is_held(), "{kind:?}");
     }
     let folder = tempfile::tempdir().unwrap();
     let results = written(folder.path(), "run.parquet", 11);

@@ -113,6 +113,10 @@ pub enum Ink {
     Black,
 }
 
+/// All colours, in the order of the curves of a plot.
+pub const INKS: [Ink; 7] =
+    [Ink::Blue, Ink::Vermilion, Ink::Green, Ink::Purple, Ink::Sky, Ink::Orange, Ink::Black];
+
 impl Ink {
     fn code(self) -> &'static str {
         match self {

@@ -302,7 +302,7 @@ impl Sum {
     fn new(column: &Column) -> Self {
         Self {
             name: column.name.clone(),
-            is_held: crate::is_held(column),
+            is_held: column.is_held(),
             largest: (0.0, f64::NAN),
             squares: [0.0; 3],
             rows: 0,

@@ -435,11 +435,6 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// Whether a variable keeps its value between two rows.
-fn is_held(column: &Column) -> bool {
-    !matches!(column.kind, ColumnKind::Real)
-}
-
 /// Formats names for a sentence: at most `limit` of them, and the number of further ones.
 fn listed(names: &[String], limit: usize) -> String {
     let more = names.len().saturating_sub(limit);

@@ -2,10 +2,9 @@
 
 use std::borrow::Cow;
 
-use figure::{Figure, Ink, Panel, Series, stairs};
+use figure::{Figure, INKS, Panel, Series, stairs};
 use results::Column;
 
-use crate::is_held;
 use crate::plots::Group;
 use crate::samples::Samples;
 
@@ -13,9 +12,6 @@ use crate::samples::Samples;
 const BYTES: usize = 300_000;
 /// Largest number of plots in the picture.
 const PANELS: usize = 6;
-/// The colours of the curves, in their order.
-const INKS: [Ink; 7] =
-    [Ink::Blue, Ink::Vermilion, Ink::Green, Ink::Purple, Ink::Sky, Ink::Orange, Ink::Black];
 
 /// Draws the first plots, as many as fit into [`BYTES`]; returns an empty text if none fits.
 pub(crate) fn svg(title: &str, groups: &[(&Group, &Samples)], columns: &[Column]) -> String {
@@ -46,7 +42,7 @@ struct Curve<'a> {
 impl<'a> Curve<'a> {
     /// Creates a curve of `values` at the times `time`: stairs for a variable that keeps its value between two rows.
     fn new(column: &'a Column, time: &'a [f64], values: &'a [f64]) -> Self {
-        let (time, values) = if is_held(column) {
+        let (time, values) = if column.is_held() {
             let (time, values) = stairs(time, values);
             (Cow::Owned(time), Cow::Owned(values))
         } else {

@@ -173,7 +173,7 @@ impl Plots {
             let other = samples.columns.get(count + place).filter(|_| other);
             Curve {
                 name: columns[*at].name.clone(),
-                holds: crate::is_held(&columns[*at]),
+                holds: columns[*at].is_held(),
                 dots: false,
                 values: self.columns.add(&samples.columns[place]),
                 other: other.map(|values| self.columns.add(values)),

@@ -88,7 +88,7 @@ impl Builder {
             basis: Basis::Values(0),
             not_finite: 0,
         };
-        let is_held = crate::is_held(column);
+        let is_held = column.is_held();
         let (integrals, sums) = ([0.0; 5], [0.0; 5]);
         Self { statistics, is_held, before: None, length: 0.0, integrals, count: 0, sums }
     }

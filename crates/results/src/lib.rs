@@ -51,6 +51,14 @@ pub struct Column {
     pub clocked: bool,
 }
 
+impl Column {
+    /// Whether the variable keeps its value between two rows: it is not interpolated, and drawn as stairs.
+    #[must_use]
+    pub fn is_held(&self) -> bool {
+        self.kind != ColumnKind::Real
+    }
+}
+
 /// The type of a column: a base type of FMI 2.0, or an integer of 64 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ColumnKind {
