@@ -33,34 +33,20 @@ const OUTPUT: usize = 4000;
 /// Why the library of an FMU cannot be built.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum CompileError {
     /// The FMU cannot be read or written, or has no source code.
     #[error(transparent)]
     Package(Box<PackageError>),
     /// The FMU states no way, or an invalid way, to build its library.
     #[error("{}: {reason}", path.display())]
-    Description {
-        /// The FMU.
-        path: PathBuf,
-        /// The missing or invalid part of the description.
-        reason: String,
-    },
+    Description { path: PathBuf, reason: String },
     /// None of the compilers that were tried runs.
     #[error("{}: no compiler for {language} here: tried {tried}; the variable {variable} names one", path.display())]
-    NoCompiler {
-        /// The FMU.
-        path: PathBuf,
-        /// The language.
-        language: &'static str,
-        /// The programs that were tried.
-        tried: String,
-        /// The environment variable that names the compiler.
-        variable: &'static str,
-    },
+    NoCompiler { path: PathBuf, language: &'static str, tried: String, variable: &'static str },
     /// The compiler or the linker fails.
     #[error("{}: {command} failed: {output}", path.display())]
     Failed {
-        /// The FMU.
         path: PathBuf,
         /// The program and the file, or "linking".
         command: String,
@@ -69,14 +55,7 @@ pub enum CompileError {
     },
     /// A file or folder cannot be read or written, or a program cannot be started.
     #[error("cannot {action} {}", path.display())]
-    File {
-        /// The operation.
-        action: &'static str,
-        /// The file, folder or program.
-        path: PathBuf,
-        /// The reason given by the system.
-        source: io::Error,
-    },
+    File { action: &'static str, path: PathBuf, source: io::Error },
 }
 
 impl From<PackageError> for CompileError {

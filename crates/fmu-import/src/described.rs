@@ -10,29 +10,18 @@ use crate::library::describe_as;
 /// Why a library has no usable generated model description.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum DescriptionError {
     /// The library does not load, or does not generate a model description.
     #[error("the library of {name} does not describe itself")]
-    None {
-        /// Name of the model for the user.
-        name: String,
-        /// The reason.
-        source: LoadError,
-    },
+    None { name: String, source: LoadError },
     /// The generated text is not a model description.
     #[error("the model description of {name}")]
-    Unreadable {
-        /// Name of the model for the user.
-        name: String,
-        /// The reason.
-        source: ParseError,
-    },
+    Unreadable { name: String, source: ParseError },
     /// The description breaks rules of the standard, or was read with warnings.
     #[error("the variables of {name} break rules of {}:\n{}", version.release(), problems.join("\n"))]
     Rules {
-        /// The version of FMI.
         version: Version,
-        /// Name of the model for the user.
         name: String,
         /// The warnings and the broken rules, each with its section of the standard.
         problems: Vec<String>,

@@ -15,6 +15,7 @@ use crate::library::{Binding, Interface, Library, Loading, Names, v1, v3};
 /// Why an FMU could not be opened or instantiated.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum FmuError {
     /// The archive or its model description cannot be read.
     #[error(transparent)]
@@ -27,36 +28,22 @@ pub enum FmuError {
     Load(#[from] LoadError),
     /// The FMU offers neither co-simulation nor scheduled execution.
     #[error("{path}: the FMU offers no co-simulation, expected the element CoSimulation")]
-    NoCoSimulation {
-        /// The FMU.
-        path: PathBuf,
-    },
+    NoCoSimulation { path: PathBuf },
     /// The FMU sets `canBeInstantiatedOnlyOncePerProcess` and already has an instance.
     #[error(
         "{instance}: {model} can be instantiated only once per process \
          (canBeInstantiatedOnlyOncePerProcess) and already has an instance; --isolate runs each \
          instance in a process of its own"
     )]
-    OnlyOnce {
-        /// Name of the second instance.
-        instance: String,
-        /// `modelName`.
-        model: String,
-    },
+    OnlyOnce { instance: String, model: String },
     /// The FMU has no interface, or lacks the requested one.
     #[error("{path}: the FMU lacks an interface, expected the element {expected}")]
-    NoInterface {
-        /// The FMU.
-        path: PathBuf,
-        /// The elements of which `modelDescription.xml` must have one.
-        expected: &'static str,
-    },
+    NoInterface { path: PathBuf, expected: &'static str },
     /// The library of an FMU with `needsExecutionTool` does not load or instantiate; the missing tool may be the cause.
     #[error("the FMU may need {tool} to be installed (needsExecutionTool is true)\n{source}")]
     NeedsTool {
         /// `generationTool`, or a description if the attribute is absent.
         tool: String,
-        /// The failure.
         source: LoadError,
     },
 }

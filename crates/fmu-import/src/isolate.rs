@@ -103,42 +103,23 @@ pub type Integrator = fn(Box<dyn ModelExchange>, &str) -> Box<dyn Slave>;
 /// Why an FMU cannot run in a separate process.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum IsolateError {
     /// The archive or its model description cannot be read.
     #[error(transparent)]
     Package(Box<PackageError>),
     /// The FMU offers neither co-simulation nor scheduled execution, and [`Options::integration`] is not stated.
     #[error("{path}: the FMU offers no co-simulation, expected the element CoSimulation")]
-    NoCoSimulation {
-        /// The FMU.
-        path: PathBuf,
-    },
+    NoCoSimulation { path: PathBuf },
     /// The FMU has no model-exchange interface, although [`Options::integration`] is stated.
     #[error("{path}: the FMU offers no model exchange, expected the element ModelExchange")]
-    NoModelExchange {
-        /// The FMU.
-        path: PathBuf,
-    },
+    NoModelExchange { path: PathBuf },
     /// The operating system refused shared memory or a connection.
     #[error("{what} for the process of {instance}")]
-    System {
-        /// The failed action.
-        what: &'static str,
-        /// The instance.
-        instance: String,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+    System { what: &'static str, instance: String, source: io::Error },
     /// The process could not be started.
     #[error("cannot start {} for {instance}", executable.display())]
-    Start {
-        /// The program.
-        executable: PathBuf,
-        /// The instance.
-        instance: String,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+    Start { executable: PathBuf, instance: String, source: io::Error },
     /// The program started but did not become a worker.
     #[error(
         "{}, started for {instance} as `{WORKER}`, did not become a worker: it {failure}; either it \
@@ -146,14 +127,7 @@ pub enum IsolateError {
          is {WORKER}",
         executable.display()
     )]
-    NoWorker {
-        /// The program.
-        executable: PathBuf,
-        /// The instance.
-        instance: String,
-        /// The cause of the failure.
-        failure: Failure,
-    },
+    NoWorker { executable: PathBuf, instance: String, failure: Failure },
     /// This process was started as a worker, but tries to start workers itself.
     #[error(
         "this process was started as `{WORKER}` to run one FMU and did not become a worker; `main` must \
@@ -169,25 +143,16 @@ pub enum IsolateError {
     /// The worker cannot load or instantiate the FMU.
     #[error("{instance}: {reason}")]
     Refused {
-        /// The instance.
         instance: String,
         /// The reason.
         reason: String,
     },
     /// The worker ended or did not answer while it loaded or instantiated the FMU.
     #[error("{instance}: {source}")]
-    Call {
-        /// The instance.
-        instance: String,
-        /// The failed call.
-        source: CallError,
-    },
+    Call { instance: String, source: CallError },
     /// This operating system does not support isolation.
     #[error("{instance}: isolation is available on Linux only")]
-    Platform {
-        /// The instance.
-        instance: String,
-    },
+    Platform { instance: String },
 }
 
 impl From<PackageError> for IsolateError {
@@ -272,21 +237,14 @@ pub fn open(path: &Path, name: &str, options: &Options) -> Result<Isolated, Isol
 /// Why a program cannot become or remain a worker.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum WorkerError {
     /// No master started the program, or the worker's memory or connection cannot be set up.
     #[error("{WORKER} is for the master's own use: {what}")]
-    Alone {
-        /// The missing or failed part.
-        what: &'static str,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+    Alone { what: &'static str, source: io::Error },
     /// The command in shared memory is invalid.
     #[error("the memory shared with the master is corrupted: found {actual}, expected a command")]
-    Corrupted {
-        /// The value found.
-        actual: u64,
-    },
+    Corrupted { actual: u64 },
     /// This operating system does not support isolation.
     #[error("isolation is available on Linux only")]
     Platform,
