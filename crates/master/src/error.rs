@@ -6,273 +6,115 @@ use slave::CallError;
 /// Error of building, initialising or advancing a system.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum SystemError {
     /// A name does not have the form `slave.variable`.
     #[error("{text:?} names no variable, expected the form {form}")]
-    Syntax {
-        /// The name found.
-        text: String,
-        /// The form expected.
-        form: &'static str,
-    },
+    Syntax { text: String, form: &'static str },
     /// Two slaves have the same name.
     #[error("there are two FMUs of the name {name:?}, expected different names")]
-    SameName {
-        /// The name of both slaves.
-        name: String,
-    },
+    SameName { name: String },
     /// No slave has this name.
     #[error("{name}: there is no FMU of the name {slave:?}, expected one of {known}")]
-    UnknownSlave {
-        /// The whole name.
-        name: String,
-        /// The part of the name that should be a slave.
-        slave: String,
-        /// The names of the slaves that exist.
-        known: String,
-    },
+    UnknownSlave { name: String, slave: String, known: String },
     /// The slave has no variable with this name.
     #[error("{name}: {model} has no variable {variable:?}{nearest}")]
     UnknownVariable {
-        /// The whole name.
         name: String,
-        /// `modelName` of the FMU.
         model: String,
-        /// The part of the name after the slave.
         variable: String,
         /// Variables with a similar name, as part of a sentence.
         nearest: String,
     },
     /// The variable has the wrong causality or type.
     #[error("{name} is {actual}, expected {expected}")]
-    Role {
-        /// The variable, as `slave.variable`.
-        name: String,
-        /// The causality or type of the variable.
-        actual: String,
-        /// The causality or type expected.
-        expected: String,
-    },
+    Role { name: String, actual: String, expected: String },
     /// An input has two sources.
     #[error("{input} is connected twice, to {first} and to {second}")]
-    Twice {
-        /// The input, as `slave.variable`.
-        input: String,
-        /// The output that is connected to the input.
-        first: String,
-        /// A second output that should be connected to the input.
-        second: String,
-    },
+    Twice { input: String, first: String, second: String },
     /// The two ends of a connection have different units.
     #[error("{from} in {from_unit} cannot be connected to {to} in {to_unit}")]
-    Unit {
-        /// The output, as `slave.variable`.
-        from: String,
-        /// The unit of the output.
-        from_unit: String,
-        /// The input, as `slave.variable`.
-        to: String,
-        /// The unit of the input.
-        to_unit: String,
-    },
+    Unit { from: String, from_unit: String, to: String, to_unit: String },
     /// Only one end of a connection is a difference, and an offset separates their units.
     #[error(
         "{relative} in {relative_unit} is a difference (relativeQuantity) and {absolute} in \
          {absolute_unit} is not: state factor and offset of the connection"
     )]
-    Relative {
-        /// The end of the connection that is a difference.
-        relative: String,
-        /// The unit of the end that is a difference.
-        relative_unit: String,
-        /// The end of the connection that is no difference.
-        absolute: String,
-        /// The unit of the end that is no difference.
-        absolute_unit: String,
-    },
+    Relative { relative: String, relative_unit: String, absolute: String, absolute_unit: String },
     /// The two ends of a connection have different sizes.
     #[error(
         "{from} is {from_size} and {to} is {to_size}: arrays of different sizes are connected by \
          element, such as {element}"
     )]
     Size {
-        /// The source of the connection, as `slave.variable`.
         from: String,
-        /// The size of the source.
         from_size: String,
-        /// The target of the connection, as `slave.variable`.
         to: String,
-        /// The size of the target.
         to_size: String,
         /// The first element of the source if it is an array, otherwise of the target.
         element: Box<str>,
     },
     /// Two terminals do not match.
     #[error("{from} cannot be connected to {to}: {why}")]
-    Terminals {
-        /// The first terminal, as `slave.terminal`.
-        from: String,
-        /// The second terminal, as `slave.terminal`.
-        to: String,
-        /// The difference between the terminals, as part of a sentence.
-        why: String,
-    },
+    Terminals { from: String, to: String, why: String },
     /// A structural parameter has removed an element of an array that is connected or set.
     #[error(
         "{name} is connected or set, but does not exist with the new size of its array; set the \
          structural parameter first"
     )]
-    Resized {
-        /// The removed element, as `slave.variable`.
-        name: String,
-    },
+    Resized { name: String },
     /// A text cannot be parsed as a value of the variable's type.
     #[error("{name} = {value:?}: expected {expected}")]
-    Value {
-        /// The variable, as `slave.variable`.
-        name: String,
-        /// The text that states the value.
-        value: String,
-        /// What was expected, as part of a sentence.
-        expected: String,
-    },
+    Value { name: String, value: String, expected: String },
     /// The standard allows nobody to set the variable.
     #[error("{name} = {value:?}: the variable is {what}, so it cannot be set")]
-    NotSettable {
-        /// The variable, as `slave.variable`.
-        name: String,
-        /// The text that states the value.
-        value: String,
-        /// What the variable is, as part of a sentence.
-        what: &'static str,
-    },
+    NotSettable { name: String, value: String, what: &'static str },
     /// An FMU refused a setting.
     #[error("{name} = {value:?}: {source}")]
-    Setting {
-        /// The variable, as `slave.variable`.
-        name: String,
-        /// The text that states the value.
-        value: String,
-        /// Function, status and messages.
-        source: CallError,
-    },
+    Setting { name: String, value: String, source: CallError },
     /// An FMU replaced a value that was set.
     #[error(
         "{name}: the value {value} that was set is lost: after the initialization the FMU has \
          {actual}. The FMU ignores or replaces the value; remove the setting"
     )]
-    LostSetting {
-        /// The variable, as `slave.variable`.
-        name: String,
-        /// The text that states the value.
-        value: String,
-        /// The value in the FMU after the initialization.
-        actual: String,
-    },
+    LostSetting { name: String, value: String, actual: String },
     /// An FMU refuses to read a variable of the results and cannot be used any more.
     #[error(
         "{name} at t = {} s: {source}. An FMU must not be used after an error: exclude {name} from the results",
         seconds(*time)
     )]
-    Unreadable {
-        /// The slave.
-        slave: Box<str>,
-        /// The variable, as `slave.variable`.
-        name: Box<str>,
-        /// Time of the master in s.
-        time: f64,
-        /// Function, status and messages.
-        source: CallError,
-    },
+    Unreadable { slave: Box<str>, name: Box<str>, time: f64, source: CallError },
     /// An FMI call for a variable failed, and the FMU cannot be used any more.
     #[error("{name} at t = {} s: {source}", seconds(*time))]
-    Variable {
-        /// The slave.
-        slave: Box<str>,
-        /// The variable, as `slave.variable`.
-        name: Box<str>,
-        /// Time of the master in s.
-        time: f64,
-        /// Function, status and messages.
-        source: CallError,
-    },
+    Variable { slave: Box<str>, name: Box<str>, time: f64, source: CallError },
     /// An FMI call failed.
     #[error("{slave} at t = {} s: {source}", seconds(*time))]
-    Call {
-        /// The slave.
-        slave: String,
-        /// Time of the master in s.
-        time: f64,
-        /// Function, status and messages.
-        source: CallError,
-    },
+    Call { slave: String, time: f64, source: CallError },
     /// The iteration of the events at a time does not end.
     #[error(
         "the events at t = {} s do not settle within {iterations} iterations: {names} still change",
         seconds(*time)
     )]
-    Unsettled {
-        /// Time in s.
-        time: f64,
-        /// Number of iterations.
-        iterations: usize,
-        /// The variables that still change.
-        names: String,
-    },
+    Unsettled { time: f64, iterations: usize, names: String },
     /// A connected output or input is NaN or infinite.
     #[error("{name} is {value} at t = {} s, expected a finite number", seconds(*time))]
-    NotFinite {
-        /// The output or input, as `slave.variable`.
-        name: String,
-        /// The value, NaN or infinite.
-        value: f64,
-        /// Time of the master in s.
-        time: f64,
-    },
+    NotFinite { name: String, value: f64, time: f64 },
     /// The algorithm needs a capability that an FMU lacks.
     #[error("{slave} cannot take part in {required_by}: its {lacks} is false")]
-    Capability {
-        /// Name of the slave.
-        slave: String,
-        /// The capability flag that is false.
-        lacks: &'static str,
-        /// The function of the master that needs the capability.
-        required_by: String,
-    },
+    Capability { slave: String, lacks: &'static str, required_by: String },
     /// The initial values of an algebraic loop cannot be found.
     #[error("the loop through {names} at t = {} s: {why}", seconds(*time))]
-    Loop {
-        /// The outputs.
-        names: String,
-        /// Time of the master in s.
-        time: f64,
-        /// How the iteration ended.
-        why: String,
-    },
+    Loop { names: String, time: f64, why: String },
     /// The iteration of a step did not converge.
     #[error(
         "the step from t = {} s over {} s cannot be solved: {why}",
         seconds(*time),
         seconds(*size)
     )]
-    Coupling {
-        /// Start of the step in s.
-        time: f64,
-        /// Size of the step in s.
-        size: f64,
-        /// How the iteration ended.
-        why: String,
-    },
+    Coupling { time: f64, size: f64, why: String },
     /// A checkpoint cannot be resumed because a setting differs.
     #[error("the checkpoint was taken with {name} {saved}; {name} {requested} is not possible")]
-    Resume {
-        /// Name of the setting.
-        name: String,
-        /// Value of the setting in the run of the checkpoint.
-        saved: String,
-        /// Value of the setting in the new run.
-        requested: String,
-    },
+    Resume { name: String, saved: String, requested: String },
     /// The error of the smallest step exceeds the tolerance.
     #[error(
         "at t = {} s the smallest step, {} s, has an error of {error:.1e} times the \
@@ -280,14 +122,7 @@ pub enum SystemError {
         seconds(*time),
         seconds(*size)
     )]
-    Stuck {
-        /// Start of the step in s.
-        time: f64,
-        /// Size of the step in s.
-        size: f64,
-        /// Error of the step as a multiple of the tolerance.
-        error: f64,
-    },
+    Stuck { time: f64, size: f64, error: f64 },
     /// The steps are so small that the run cannot reach its stop time.
     #[error(
         "at t = {} s the last {steps} steps cover {length:.1e} s in total, close to the \
@@ -296,34 +131,13 @@ pub enum SystemError {
         seconds(*time),
         seconds(*smallest)
     )]
-    TooManySteps {
-        /// Number of steps in the observed interval.
-        steps: u32,
-        /// Total length in s of the steps of this interval.
-        length: f64,
-        /// Smallest step in s.
-        smallest: f64,
-        /// Time reached in s.
-        time: f64,
-        /// Estimated number of remaining steps.
-        left: f64,
-    },
+    TooManySteps { steps: u32, length: f64, smallest: f64, time: f64, left: f64 },
     /// The settings of the algorithm contradict each other or the system.
     #[error("{what}")]
-    Algorithm {
-        /// Description of the contradiction.
-        what: String,
-    },
+    Algorithm { what: String },
     /// A step size or a time of the run is invalid.
     #[error("{what} is {value} s, expected {rule}")]
-    Time {
-        /// Name of the quantity.
-        what: &'static str,
-        /// Value of the quantity.
-        value: f64,
-        /// The condition that the value must satisfy.
-        rule: String,
-    },
+    Time { what: &'static str, value: f64, rule: String },
 }
 
 /// Wraps the error of an FMI call of `slave` at `time`.

@@ -112,21 +112,13 @@ pub enum LossPattern {
 /// Error of creating a [`FaultChain`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum FaultError {
     /// A delay spans too many communication steps.
     #[error(
         "a delay of {seconds} s is {steps:.0} communication steps of {step} s, expected at most {most}"
     )]
-    Delay {
-        /// The delay in s.
-        seconds: f64,
-        /// The communication step in s.
-        step: f64,
-        /// Number of communication steps in the delay.
-        steps: f64,
-        /// The largest number allowed.
-        most: f64,
-    },
+    Delay { seconds: f64, step: f64, steps: f64, most: f64 },
 }
 
 /// All faults on one connection, applied in order.

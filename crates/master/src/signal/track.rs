@@ -46,6 +46,7 @@ pub struct Track {
 /// Error of creating a [`Track`]. Points count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum TrackError {
     /// There are no points.
     #[error("there are no points, expected at least one")]
@@ -53,31 +54,17 @@ pub enum TrackError {
     /// A time or a value is not finite, or a time is too large.
     #[error("point {point}: the {what} is {actual}, expected a finite number")]
     Number {
-        /// Number of the point.
         point: usize,
         /// "time" or "value".
         what: &'static str,
-        /// The number found.
         actual: f64,
     },
     /// A time is less than the time before it.
     #[error("point {point}: the time {actual} s comes after {before} s, expected ascending times")]
-    Order {
-        /// Number of the point.
-        point: usize,
-        /// The time of the point before.
-        before: f64,
-        /// The time of the point.
-        actual: f64,
-    },
+    Order { point: usize, before: f64, actual: f64 },
     /// Times and values have different lengths.
     #[error("there are {values} values, expected {times}, one for each time")]
-    Lengths {
-        /// Number of times.
-        times: usize,
-        /// Number of values.
-        values: usize,
-    },
+    Lengths { times: usize, values: usize },
 }
 
 impl Track {
