@@ -123,37 +123,27 @@ pub trait Sink: Send {
 /// The error of writing or reading results.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum ResultsError {
     /// The extension of the file is neither `.csv` nor `.parquet`.
     #[error("{}: results are written as .csv or .parquet", path.display())]
-    Format {
-        /// Path of the file.
-        path: PathBuf,
-    },
+    Format { path: PathBuf },
     /// The extension of a file that is read is none of `.csv`, `.parquet` and `.mat`.
     #[error(
         "{}: expected results as .csv, .parquet or .mat (of Dymola or OpenModelica); save them as CSV or \
          Parquet first",
         path.display()
     )]
-    Extension {
-        /// Path of the file.
-        path: PathBuf,
-    },
+    Extension { path: PathBuf },
     /// Two columns have the same name.
     #[error("two columns of the results have the name {name:?}")]
-    Duplicate {
-        /// The name of both columns.
-        name: String,
-    },
+    Duplicate { name: String },
     /// The number of values of a type in a row differs from the number of columns of this type.
     #[error("a row has {actual} values of type {kind:?}, expected {expected}")]
     Values {
         /// Type of the values; Integer stands for Integer and Long.
         kind: ColumnKind,
-        /// Number of columns of this type.
         expected: usize,
-        /// Number of values of this type in the row.
         actual: usize,
     },
     /// Another process or another sink is writing the file.
@@ -162,113 +152,61 @@ pub enum ResultsError {
      folder or file (--out, --results)",
         path.display()
     )]
-    InUse {
-        /// Path of the file.
-        path: PathBuf,
-    },
+    InUse { path: PathBuf },
     /// The file cannot be created or written.
     #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// Path of the file.
-        path: PathBuf,
-        /// The reason, such as a full disk.
-        source: io::Error,
-    },
+    Write { path: PathBuf, source: io::Error },
     /// The length of the file differs from the number of bytes that were written.
     #[error(
         "{}: the file has {actual} bytes, expected {expected}: an FMU or another program has changed it \
          during the run. With --isolate no FMU reaches the files of the command",
         path.display()
     )]
-    Length {
-        /// Path of the file.
-        path: PathBuf,
-        /// Number of bytes that were written.
-        expected: u64,
-        /// Number of bytes in the file.
-        actual: u64,
-    },
+    Length { path: PathBuf, expected: u64, actual: u64 },
     /// The write position of the open file was moved, so rows may be overwritten.
     #[error(
         "{}: an FMU has used the descriptor of this file and may have overwritten rows. With --isolate \
          no FMU reaches the files of the command",
         path.display()
     )]
-    Overwritten {
-        /// Path of the file.
-        path: PathBuf,
-    },
+    Overwritten { path: PathBuf },
     /// The path no longer leads to the file that was written, or the descriptor of a pipe or a device is lost.
     #[error("{}: the file was deleted, moved or replaced during the run", path.display())]
-    Gone {
-        /// The path of the file.
-        path: PathBuf,
-    },
+    Gone { path: PathBuf },
     /// The process is a copy (fork) of the process that writes the file.
     #[error(
         "{}: an FMU has duplicated the process of the run (fork) and returned in both; only the first \
          process writes the results",
         path.display()
     )]
-    Forked {
-        /// Path of the file.
-        path: PathBuf,
-    },
+    Forked { path: PathBuf },
     /// The file cannot be read, or its content does not match its extension.
     #[error("cannot read {}: {reason}", path.display())]
-    Read {
-        /// Path of the file.
-        path: PathBuf,
-        /// The reason.
-        reason: String,
-    },
+    Read { path: PathBuf, reason: String },
     /// A cell does not contain a number.
     #[error("{}, line {line}: {name} is {text:?}, expected a number", path.display())]
-    Number {
-        /// Path of the file.
-        path: PathBuf,
-        /// Line, counted from 1.
-        line: u64,
-        /// Name of the column.
-        name: String,
-        /// Content of the cell.
-        text: String,
-    },
+    Number { path: PathBuf, line: u64, name: String, text: String },
     /// A time is earlier than the time of the row before.
     #[error(
         "{}, {place}: {name} is {time} after {before}, expected times that do not decrease{hint}",
         path.display()
     )]
     Order {
-        /// Path of the file.
         path: PathBuf,
         /// Line or row, counted from 1.
         place: String,
-        /// Name of the time column.
         name: String,
-        /// The time that is earlier, in s.
         time: f64,
-        /// The time of the row before, in s.
         before: f64,
         /// Says if the column is the time because it is the first one; otherwise empty.
         hint: &'static str,
     },
     /// A column contains texts; numbers are required.
     #[error("{}: {name} holds texts, expected numbers", path.display())]
-    Text {
-        /// Path of the file.
-        path: PathBuf,
-        /// Name of the column.
-        name: String,
-    },
+    Text { path: PathBuf, name: String },
     /// A pattern matches no column, or the selection is empty.
     #[error("{}: {source}", path.display())]
-    Selection {
-        /// Path of the file.
-        path: PathBuf,
-        /// The error of the selection.
-        source: SelectionError,
-    },
+    Selection { path: PathBuf, source: SelectionError },
 }
 
 /// Creates a result file, and the folder of the file if the folder is missing. The extension `.csv` or `.parquet`
