@@ -11,6 +11,7 @@ use ssp::SspError;
 /// Error of reading, preparing or running a study.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum Error {
     /// An entry of a file is invalid; the error has its line.
     #[error(transparent)]
@@ -45,14 +46,7 @@ pub enum Error {
     Outputs(#[from] files::OutputConflict),
     /// A file cannot be read or written.
     #[error("cannot {action} {}", path.display())]
-    File {
-        /// The action that failed, for example "read" or "write".
-        action: &'static str,
-        /// Path of the file.
-        path: PathBuf,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+    File { action: &'static str, path: PathBuf, source: io::Error },
     /// An entry of a scenario is wrong.
     #[error(transparent)]
     Scenario(#[from] crate::scenario::ScenarioError),
@@ -61,12 +55,7 @@ pub enum Error {
     Selection(#[from] SelectionError),
     /// An error with its context, such as an FMU or an entry. The message is the context only.
     #[error("{what}")]
-    Within {
-        /// The context, such as the name of an FMU.
-        what: String,
-        /// The error without its context.
-        source: Box<Error>,
-    },
+    Within { what: String, source: Box<Error> },
     /// A setting, a file or a request is invalid; the sentence states the reason.
     #[error("{0}")]
     Invalid(String),

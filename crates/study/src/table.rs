@@ -39,6 +39,7 @@ impl Table {
 /// Error of reading a [`Table`]. Lines and columns count from 1.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum TableError {
     /// The file cannot be read.
     #[error(transparent)]
@@ -48,85 +49,42 @@ pub enum TableError {
     Large,
     /// The file is not UTF-8 text.
     #[error("line {line}: expected UTF-8 text, found other bytes")]
-    Encoding {
-        /// Number of the line.
-        line: usize,
-    },
+    Encoding { line: usize },
     /// The file is empty or has only empty lines.
     #[error("the file is empty, expected a header such as \"time\",\"u\" and rows of numbers")]
     Empty,
     /// The first column is not `time`.
     #[error("line {line}: the first column is {actual:?}, expected \"time\"{hint}")]
     NoTime {
-        /// Number of the line.
         line: usize,
-        /// Name of the first column.
         actual: String,
         /// A hint at the probable cause; may be empty.
         hint: &'static str,
     },
     /// A column has no name.
     #[error("line {line}: column {column} has no name")]
-    Unnamed {
-        /// Number of the line.
-        line: usize,
-        /// Number of the column.
-        column: usize,
-    },
+    Unnamed { line: usize, column: usize },
     /// Two columns have the same name.
     #[error("line {line}: the columns {first} and {second} are both called {name:?}")]
-    Twice {
-        /// Number of the line.
-        line: usize,
-        /// The name of both columns.
-        name: String,
-        /// Number of the first column.
-        first: usize,
-        /// Number of the second column.
-        second: usize,
-    },
+    Twice { line: usize, name: String, first: usize, second: usize },
     /// There is no column except the time.
     #[error("line {line}: there is no column but the time")]
-    NoColumns {
-        /// Number of the line.
-        line: usize,
-    },
+    NoColumns { line: usize },
     /// There are no rows.
     #[error("there is no row after the header")]
     NoRows,
     /// A row has another length than the header.
     #[error("line {line}: expected {expected} entries as in the header, found {actual}")]
-    Width {
-        /// Number of the line.
-        line: usize,
-        /// Number of entries of the header.
-        expected: usize,
-        /// Number of entries of the row.
-        actual: usize,
-    },
+    Width { line: usize, expected: usize, actual: usize },
     /// An entry is not a finite number.
     #[error(
         "line {line}, column {column:?}: expected a finite number{}, found {actual:?}",
         if column == results::TIME { " or a date of ISO 8601" } else { "" }
     )]
-    Number {
-        /// Number of the line.
-        line: usize,
-        /// Name of the column.
-        column: String,
-        /// The text of the entry.
-        actual: String,
-    },
+    Number { line: usize, column: String, actual: String },
     /// A time is less than the time before it.
     #[error("line {line}: the time {actual} s comes after {before} s, expected ascending times")]
-    Order {
-        /// Number of the line.
-        line: usize,
-        /// The time before, in s.
-        before: f64,
-        /// The time that is less, in s.
-        actual: f64,
-    },
+    Order { line: usize, before: f64, actual: f64 },
 }
 
 /// Reads the file at `path`.
