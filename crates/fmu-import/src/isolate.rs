@@ -56,9 +56,11 @@ use slave::{CallError, Failure, ModelExchange, Slave};
 #[cfg(target_os = "linux")]
 pub use isolated::Isolated;
 #[cfg(not(target_os = "linux"))]
-pub use unsupported::{Isolated, worker, worker_with};
+pub use unsupported::Isolated;
+#[cfg(not(target_os = "linux"))]
+use unsupported::run;
 #[cfg(target_os = "linux")]
-pub use worker::{worker, worker_with};
+use worker::run;
 
 /// The first and only argument of a program that is to become a worker.
 pub const WORKER: &str = "--fmu-worker";
@@ -248,4 +250,25 @@ pub enum WorkerError {
     /// This operating system does not support isolation.
     #[error("isolation is available on Linux only")]
     Platform,
+}
+
+/// Runs this process as a worker of the master that started it. Returns when the master frees the instance or closes
+/// the connection; if the master ends, the process is killed. Standard output is redirected to standard error.
+///
+/// # Errors
+///
+/// [`WorkerError::Alone`] if no master started this process, or if memory or connection of the worker cannot be set up;
+/// [`WorkerError::Corrupted`] if the FMU overwrote the shared memory; [`WorkerError::Platform`] on another system than
+/// Linux.
+pub fn worker() -> Result<(), WorkerError> {
+    run(None)
+}
+
+/// Like [`worker`], but also runs instances for model exchange, which `integrator` integrates.
+///
+/// # Errors
+///
+/// Same as [`worker`].
+pub fn worker_with(integrator: Integrator) -> Result<(), WorkerError> {
+    run(Some(integrator))
 }

@@ -31,20 +31,7 @@ impl Isolated {
 }
 
 /// Returns the error that this operating system does not support workers.
-///
-/// # Errors
-///
-/// Always [`WorkerError::Platform`].
-pub fn worker() -> Result<(), WorkerError> {
-    Err(WorkerError::Platform)
-}
-
-/// Returns the error that this operating system does not support workers.
-///
-/// # Errors
-///
-/// Always [`WorkerError::Platform`].
-pub fn worker_with(_: Integrator) -> Result<(), WorkerError> {
+pub(super) fn run(_: Option<Integrator>) -> Result<(), WorkerError> {
     Err(WorkerError::Platform)
 }
 

@@ -44,28 +44,8 @@ const NO_INTEGRATOR: &str = "this program cannot integrate model-exchange FMUs i
 /// Number of bytes that stay allocated for the next request and for its answer.
 const BUFFER: usize = 1 << 16;
 
-/// Runs this process as a worker of the master that started it. Returns when the master frees the instance or closes
-/// the connection; if the master ends, the process is killed. Standard output is redirected to standard error.
-///
-/// # Errors
-///
-/// [`WorkerError::Alone`] if no master started this process, or if memory or connection of the worker cannot be set up;
-/// [`WorkerError::Corrupted`] if the FMU overwrote the shared memory.
-pub fn worker() -> Result<(), WorkerError> {
-    run(None)
-}
-
-/// Like [`worker`], but also runs instances for model exchange, which `integrator` integrates.
-///
-/// # Errors
-///
-/// Same as [`worker`].
-pub fn worker_with(integrator: Integrator) -> Result<(), WorkerError> {
-    run(Some(integrator))
-}
-
 /// Runs the worker. The master passes the shared memory as standard output and the connection as standard input.
-fn run(integrator: Option<Integrator>) -> Result<(), WorkerError> {
+pub(super) fn run(integrator: Option<Integrator>) -> Result<(), WorkerError> {
     IS_WORKER.store(true, Ordering::Relaxed);
     let error = |what| move |source| WorkerError::Alone { what, source };
     let memory = stdout().as_fd().try_clone_to_owned().map_err(error("no shared memory"))?;
