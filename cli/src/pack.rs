@@ -146,7 +146,6 @@ struct PackOptions<'a> {
     versions: Versions,
 }
 
-/// A packed FMU.
 pub(crate) struct PackedFmu {
     pub(crate) path: PathBuf,
     description: ModelDescription,

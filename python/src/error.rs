@@ -73,7 +73,6 @@ const RUN: &str = "RunError";
 const RESULTS: &str = "ResultsError";
 const DESIGN: &str = "DesignError";
 
-/// Returns the exception of a study.
 pub(crate) fn study(error: &study::Error) -> Exception {
     use study::Error as E;
     let sentence = error.sentence();

@@ -150,7 +150,6 @@ fn content(unpacked: &Unpacked) -> Result<Package, CompileError> {
     Ok(content)
 }
 
-/// A compiler.
 struct Compiler {
     /// The program of the compiler and the program's arguments.
     words: Vec<OsString>,

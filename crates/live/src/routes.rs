@@ -35,7 +35,6 @@ pub(crate) struct Site {
 }
 
 impl Site {
-    /// Answers a request.
     pub(crate) fn answer(&self, request: &HttpRequest) -> Answer {
         let path = match self.guard.admit(request) {
             Ok(path) => path,

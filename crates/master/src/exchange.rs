@@ -353,14 +353,12 @@ impl Exchange {
         }
     }
 
-    /// Saves all values in `values`.
     pub(crate) fn save(&self, values: &mut Values) {
         values.reals.copy(&self.reals.trace);
         self.held.save(&mut values.held);
         self.at_events.save(&mut values.at_events);
     }
 
-    /// Restores all values from `values`.
     pub(crate) fn restore(&mut self, values: &Values) {
         self.reals.trace.copy(&values.reals);
         self.held.restore(&values.held);

@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 
 use aso_controller::design::detection::TestDesign;
 
-/// The state of a test.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct TestState {
     /// S+ and S-, or the sums of the window.

@@ -29,7 +29,6 @@ pub(super) enum Side {
     Worker,
 }
 
-/// The result of a wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WaitResult {
     /// The turn has changed to this value.

@@ -40,7 +40,6 @@ impl Region {
         Ok(Self { map: MmapOptions::new().map_raw(file)? })
     }
 
-    /// Returns the words.
     #[inline]
     pub(super) fn words(&self) -> &[AtomicU64] {
         let length = self.map.len() / WORD;

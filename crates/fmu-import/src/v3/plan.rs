@@ -130,7 +130,6 @@ impl Plans {
         Ok(place)
     }
 
-    /// Returns the runs of a plan.
     pub(super) fn runs(&mut self, plan: usize) -> &mut Vec<Run> {
         &mut self.plans[plan].runs
     }

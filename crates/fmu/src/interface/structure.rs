@@ -127,7 +127,6 @@ fn known(variables: &Variables, variable: &Declaration, name: &str) -> Result<u3
     Ok(if name == "time" { 1 } else { index(variables.find(&variable.name, name)?) })
 }
 
-/// Returns the row of an initial unknown.
 fn initial_row(variables: &Variables, position: usize) -> Result<Unknown, Failure> {
     let variable = &variables.declarations[position];
     let Some(names) = &variable.initially else {

@@ -26,7 +26,6 @@ pub(crate) struct Access<T> {
     same: fn(&T, &T) -> bool,
 }
 
-/// Access to Reals.
 pub(crate) const REALS: Access<f64> = Access {
     get: |slave, references, values| slave.get_real(references, values),
     set: |slave, references, values| slave.set_real(references, values),
@@ -56,7 +55,6 @@ pub(crate) const INTEGERS: Access<i64> = Access {
     same: |one, other| one == other,
 };
 
-/// Access to Booleans.
 pub(crate) const BOOLEANS: Access<i32> = Access {
     get: |slave, references, values| slave.get_boolean(references, values),
     set: |slave, references, values| slave.set_boolean(references, values),
@@ -73,7 +71,6 @@ pub(crate) const BOOLEANS: Access<i32> = Access {
     same: |one, other| (*one != 0) == (*other != 0),
 };
 
-/// Access to Strings.
 pub(crate) const STRINGS: Access<String> = Access {
     get: |slave, references, values| slave.get_string(references, values),
     set: |slave, references, values| slave.set_string(references, values),
@@ -83,7 +80,6 @@ pub(crate) const STRINGS: Access<String> = Access {
     same: |one, other| one == other,
 };
 
-/// Access to binaries.
 pub(crate) const BINARIES: Access<Vec<u8>> = Access {
     get: |slave, references, values| slave.get_binary(references, values),
     set: |slave, references, values| slave.set_binary(references, values),

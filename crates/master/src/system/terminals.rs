@@ -11,7 +11,6 @@ use crate::error::SystemError;
 const TRANSCEIVER: &str = fmu_description::can::MATCHING_RULE;
 const RULES: &str = "plug, bus, sequence or org.fmi-ls-bus.transceiver";
 
-/// A terminal of a slave.
 #[derive(Clone, Copy)]
 struct SlaveTerminal<'a> {
     slave: usize,

@@ -157,7 +157,6 @@ fn asc(file: &mut impl Write, time: f64, bus: usize, frame: &Frame) -> io::Resul
     }
 }
 
-/// Returns the name of a bus.
 fn name(bus: usize) -> String {
     format!("can{bus}")
 }

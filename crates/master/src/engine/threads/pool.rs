@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// A pool of threads.
 pub(super) struct Pool(ThreadPool);
 
 impl Pool {
