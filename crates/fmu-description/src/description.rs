@@ -26,7 +26,6 @@ pub use model_structure::{ModelStructure, Unknown};
 pub use native_type::NativeType;
 pub(crate) use render::{Output, Tag};
 pub use rules::{Problem, array_element, is_structured_name, misplaced_elements};
-pub(crate) use variable::hexadecimal;
 pub use variable::{Dimension, Elements, ScalarVariable};
 pub use version::Version;
 pub use words::{Causality, DependencyKind, Initial, Variability};

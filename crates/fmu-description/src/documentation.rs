@@ -4,8 +4,9 @@ use std::borrow::Cow;
 
 use crate::description::{
     CoSimulation, DefaultExperiment, Dimension, Elements, IntegerType, Kind, ModelDescription,
-    ModelExchange, ScalarVariable, SimpleType, Unknown, Version, attributes, hexadecimal,
+    ModelExchange, ScalarVariable, SimpleType, Unknown, Version, attributes,
 };
+use crate::hex::to_hex;
 
 const STYLE: &str = ":root { color-scheme: light dark; --text: #222; --page: #fff; --rule: #ccc; --band: #f2f2f2; } \
 @media (prefers-color-scheme: dark) { :root { --text: #ddd; --page: #16181c; --rule: #555; --band: #26292f; } } \
@@ -206,7 +207,7 @@ pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
         }
         Kind::Boolean(start) => (none(), only(start.map(|start| start.to_string()))),
         Kind::String(start) => (none(), only(start.as_ref().map(|start| format!("\"{start}\"")))),
-        Kind::Binary(binary) => (none(), only(binary.start.as_deref().map(hexadecimal))),
+        Kind::Binary(binary) => (none(), only(binary.start.as_deref().map(to_hex))),
         Kind::Clock(clock) => {
             let interval = clock.interval_decimal.map(|value| format!("{value:?}"));
             ("s".to_owned(), only(interval))

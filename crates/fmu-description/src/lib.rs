@@ -28,6 +28,7 @@ mod description;
 pub mod documentation;
 mod experiment;
 mod hash_form;
+mod hex;
 pub mod limits;
 pub mod location;
 pub mod number;
@@ -41,6 +42,7 @@ pub mod xml;
 
 pub use description::*;
 pub use experiment::Experiment;
+pub use hex::{from_hex, to_hex};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -13,10 +13,11 @@ mod value;
 pub use events::Events;
 pub use fmu_description::abi::Status;
 use fmu_description::{Experiment, ModelDescription};
+pub use fmu_description::{from_hex, to_hex};
 pub use model_exchange::{CompletedStep, EventInfo, ModelExchange};
 pub use time::time_rounding;
 pub use transformation::Transformation;
-pub use value::{Value, ValueType, from_hex, mapped_integer, to_hex, to_real};
+pub use value::{Value, ValueType, mapped_integer, to_real};
 
 /// An instance of a co-simulation FMU of FMI 1.0, 2.0 or 3.0.
 ///

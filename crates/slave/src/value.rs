@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use fmu_description::{IntegerType, Kind, SimpleType, Version};
+use fmu_description::{IntegerType, Kind, SimpleType, Version, from_hex, to_hex};
 use serde::{Deserialize, Serialize};
 
 /// Relative tolerance of [`Value::is_near`] for Reals.
@@ -108,28 +108,6 @@ pub fn to_real(value: i64) -> f64 {
 pub fn mapped_integer(pairs: &[(i32, i32)], value: i64) -> i64 {
     let pair = pairs.iter().find(|(from, _)| i64::from(*from) == value);
     pair.map_or(value, |(_, to)| (*to).into())
-}
-
-/// Returns the bytes as hexadecimal digits, as a model description writes a Binary (FMI 3.0.2, section
-/// 2.4.7.8).
-#[must_use]
-pub fn to_hex(bytes: &[u8]) -> String {
-    use fmt::Write as _;
-    let mut text = String::with_capacity(2 * bytes.len());
-    for byte in bytes {
-        // Writing to a String does not fail.
-        let _ = write!(text, "{byte:02x}");
-    }
-    text
-}
-
-/// Returns the bytes that `text` states, two hexadecimal digits for each; `None` if another character occurs or if the
-/// number of digits is odd.
-#[must_use]
-pub fn from_hex(text: &str) -> Option<Vec<u8>> {
-    let digits: Option<Vec<u32>> = text.chars().map(|digit| digit.to_digit(16)).collect();
-    let digits = digits.filter(|digits| digits.len() % 2 == 0)?;
-    digits.chunks(2).map(|pair| u8::try_from(16 * pair[0] + pair[1]).ok()).collect()
 }
 
 impl Value {

@@ -227,8 +227,3 @@ impl ModelDescription {
         u64::try_from(variable.kind.as_integer()?.start?).ok()
     }
 }
-
-/// Returns two hexadecimal digits for each byte, as in the start value of a Binary.
-pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
-}

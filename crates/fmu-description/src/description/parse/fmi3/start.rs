@@ -4,6 +4,7 @@ use super::kinds::rounding;
 use crate::description::parse::attributes::{Node, Result, integer};
 use crate::description::parse::structure::words;
 use crate::description::{Elements, Kind, Version};
+use crate::hex::from_hex;
 
 /// Reads `start`, or the elements `Start` of a String or Binary. A single value becomes the start of
 /// `kind`; several values are returned. A Clock has none.
@@ -35,7 +36,9 @@ pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements
         }
         Kind::Binary(binary_type) => {
             let wrong = |text| element.wrong("value", "pairs of hexadecimal digits", text);
-            let bytes = texts(element).map(|text| hexadecimal(text).ok_or_else(|| wrong(text)));
+            let digits = |text: &str| text.split_ascii_whitespace().collect::<String>();
+            let bytes =
+                texts(element).map(|text| from_hex(&digits(text)).ok_or_else(|| wrong(text)));
             let values = bytes.collect::<Result<_>>()?;
             single(values, |value| binary_type.start = Some(value)).map(Elements::Binary)
         }
@@ -80,17 +83,4 @@ fn boolean(text: &str) -> Option<bool> {
 /// Returns the value of each element `Start`, an empty text if the attribute `value` is missing.
 fn texts(element: Node<'_>) -> impl Iterator<Item = &str> {
     element.children_named("Start").map(|start| start.attribute("value").unwrap_or_default())
-}
-
-/// Decodes pairs of hexadecimal digits, ignoring white space; `None` for other characters or a single digit.
-fn hexadecimal(text: &str) -> Option<Vec<u8>> {
-    let digits: Vec<u8> = text.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
-    let digit = |byte: u8| char::from(byte).to_digit(16).and_then(|digit| u8::try_from(digit).ok());
-    digits
-        .chunks(2)
-        .map(|pair| match pair {
-            [high, low] => Some(digit(*high)? << 4 | digit(*low)?),
-            _ => None,
-        })
-        .collect()
 }

@@ -4,8 +4,9 @@ use super::{attributes_of, reference, references, single};
 use crate::description::render::Output;
 use crate::description::render::tag::Tag;
 use crate::description::{
-    Dimension, Elements, Initial, Kind, ModelDescription, ScalarVariable, Version, hexadecimal,
+    Dimension, Elements, Initial, Kind, ModelDescription, ScalarVariable, Version,
 };
+use crate::hex::to_hex;
 
 impl Output {
     /// Writes each variable that is no alias, with its aliases inside, which are the variables with its name in
@@ -118,12 +119,12 @@ fn join<T>(values: &[T], text: impl Fn(&T) -> String) -> String {
 
 /// Returns the values of the elements `Start` of a String or Binary; empty for other types.
 fn start_elements(variable: &ScalarVariable) -> Vec<String> {
-    let hexadecimal = |bytes: &Vec<u8>| hexadecimal(bytes);
+    let digits = |bytes: &Vec<u8>| to_hex(bytes);
     match (&variable.start_elements, &variable.kind) {
         (Some(Elements::String(texts)), _) => texts.clone(),
-        (Some(Elements::Binary(binaries)), _) => binaries.iter().map(hexadecimal).collect(),
+        (Some(Elements::Binary(binaries)), _) => binaries.iter().map(digits).collect(),
         (_, Kind::String(start)) => start.iter().cloned().collect(),
-        (_, Kind::Binary(binary)) => binary.start.iter().map(hexadecimal).collect(),
+        (_, Kind::Binary(binary)) => binary.start.iter().map(digits).collect(),
         _ => Vec::new(),
     }
 }
