@@ -47,36 +47,19 @@ const EVENT_LIMIT: u32 = 10_000;
 pub(crate) enum Failure {
     /// Start or duration is not finite, or the duration is negative.
     #[error("interval from {start} s of {duration} s: must be finite and not negative")]
-    Interval {
-        /// Start of the interval in s.
-        start: f64,
-        /// Duration of the interval in s.
-        duration: f64,
-    },
+    Interval { start: f64, duration: f64 },
     /// The force, the state or its derivative is infinite or not a number.
     #[error("force, state or its derivative is not finite after t = {time} s")]
-    NotFinite {
-        /// The time reached in s.
-        time: f64,
-    },
+    NotFinite { time: f64 },
     /// No step is short enough for the tolerance.
     #[error("the integration step fell below {SHORTEST_STEP} s at t = {time} s")]
-    StepUnderflow {
-        /// Time reached in s.
-        time: f64,
-    },
+    StepUnderflow { time: f64 },
     /// The interval needs too many integration steps: the parameters make the motion too fast.
     #[error("more than {STEP_LIMIT} integration steps in one communication step, at t = {time} s")]
-    TooManySteps {
-        /// Time reached in s.
-        time: f64,
-    },
+    TooManySteps { time: f64 },
     /// The cart stops and starts too often.
     #[error("more than {EVENT_LIMIT} stick-slip events in one communication step, at t = {time} s")]
-    TooManyEvents {
-        /// Time reached in s.
-        time: f64,
-    },
+    TooManyEvents { time: f64 },
 }
 
 impl Failure {

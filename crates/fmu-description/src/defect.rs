@@ -37,10 +37,7 @@ pub enum ParseError {
     },
     /// The file is too long.
     #[error("expected at most {limit} bytes, found more{HELP}")]
-    Length {
-        /// The limit in bytes.
-        limit: usize,
-    },
+    Length { limit: usize },
     /// The file is not well-formed XML.
     #[error("{at}: expected well-formed XML, found: {actual}")]
     Xml { at: Position, actual: String },

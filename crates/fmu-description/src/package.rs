@@ -27,12 +27,7 @@ pub const DESCRIPTION: &str = "modelDescription.xml";
 pub enum PackageError {
     /// An operation of the file system failed.
     #[error("cannot {action} {}", path.display())]
-    File {
-        action: &'static str,
-        path: PathBuf,
-        /// The reason given by the system.
-        source: io::Error,
-    },
+    File { action: &'static str, path: PathBuf, source: io::Error },
     /// The file is not a ZIP archive, or an archive with invalid, overlapping or encrypted entries.
     #[error("{} is no ZIP archive that can be used", path.display())]
     Archive { path: PathBuf, source: io::Error },

@@ -120,32 +120,16 @@ pub enum UnitError {
         "unit {expression:?}, column {column}: expected a unit such as kg, m, s, rad, N, J, W, Pa, \
          degC or %, with or without an SI prefix, found {name:?}"
     )]
-    UnknownName {
-        expression: String,
-        /// Column at which the name of the unit starts.
-        column: usize,
-        name: String,
-    },
+    UnknownName { expression: String, column: usize, name: String },
     /// A character does not fit the syntax.
     #[error("unit {expression:?}, column {column}: expected {expected}, found {actual}")]
-    Syntax {
-        expression: String,
-        /// Column of the character.
-        column: usize,
-        expected: &'static str,
-        actual: String,
-    },
+    Syntax { expression: String, column: usize, expected: &'static str, actual: String },
     /// A unit with an offset (such as degC) is part of a larger expression, where an offset has no meaning.
     #[error(
         "unit {expression:?}, column {column}: {name} has an offset and can only stand alone, \
          expected a unit without one, such as K"
     )]
-    Offset {
-        expression: String,
-        /// Column at which the name of the unit starts.
-        column: usize,
-        name: String,
-    },
+    Offset { expression: String, column: usize, name: String },
     /// The conversion factor is not within 1e-300 and 1e300.
     #[error(
         "unit {expression:?}: expected a conversion factor from 1e-300 to 1e300, found {actual}"

@@ -293,6 +293,7 @@ impl Step {
 /// The failure of a call, with a message for the importer's logger.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum Failure {
     /// `fmi2Discard`: the call was rejected; the instance is unchanged. Becomes `fmi2Error` in functions
     /// that must not return `fmi2Discard` (section 2.1.3: initialization, events, directional
@@ -301,21 +302,11 @@ pub enum Failure {
     Discard(String),
     /// `fmi2Discard` from `fmi2DoStep`: the step ended early at `time` (in s).
     #[error("stopped at t = {time} s: {message}")]
-    Incomplete {
-        /// Last time reached, in s.
-        time: f64,
-        /// The reason.
-        message: String,
-    },
+    Incomplete { time: f64, message: String },
     /// `fmi2Discard` from `fmi2DoStep` with `fmi2Terminated`: the model reached `time` (in s) and
     /// requests the end of the simulation.
     #[error("the simulation ends at t = {time} s: {message}")]
-    Terminated {
-        /// Last time reached, in s.
-        time: f64,
-        /// The reason.
-        message: String,
-    },
+    Terminated { time: f64, message: String },
     /// The model implements no step of its own, at all or for this step, and has not changed: the exporter integrates
     /// its equations. Only [`Model::step`] and [`Model::step_to_event`] return this failure.
     #[error("the model has no step of its own; fmu::Simulation integrates its equations")]

@@ -189,13 +189,7 @@ pub enum Error {
         "{file}: line {line}: expected a frame as candump writes it, such as \
          `(0.001200) can0 101#0080`, found `{actual}`; `--bus-trace NAME.log` writes such a trace"
     )]
-    Frame {
-        file: String,
-        /// The number of the line.
-        line: usize,
-        /// The start of the line.
-        actual: String,
-    },
+    Frame { file: String, line: usize, actual: String },
     /// The two files have no variable with numbers in common.
     #[error("{file} and {other} have no variable in common")]
     Apart { file: String, other: String },

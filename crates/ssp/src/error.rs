@@ -25,12 +25,7 @@ pub enum SspError {
     In { file: PathBuf, reason: Box<SspError> },
     /// An operation on a file failed.
     #[error("cannot {action} {}", path.display())]
-    File {
-        action: &'static str,
-        path: PathBuf,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+    File { action: &'static str, path: PathBuf, source: io::Error },
     /// An archive (SSP or FMU) cannot be read or written.
     #[error(transparent)]
     Package(Box<PackageError>),
