@@ -2,12 +2,17 @@
 
 use std::path::PathBuf;
 
-use slave::{CallError, Failure};
+use slave::{CallError, Events, Failure, Slave, absent};
 
 /// Returns the error of a call of `function` that is refused, or whose result is impossible, for the reason `what`.
 #[cold]
 pub(crate) fn refused(function: &'static str, what: String) -> CallError {
     CallError { function, failure: Failure::InvalidAnswer(what), messages: Vec::new() }
+}
+
+/// Returns the interface for the events of a slave; an error if the slave has none.
+pub(crate) fn events<S: Slave + ?Sized>(slave: &mut S) -> Result<&mut dyn Events, CallError> {
+    slave.events().ok_or_else(|| absent("fmi3EnterEventMode"))
 }
 
 /// Why a library cannot be loaded or used.

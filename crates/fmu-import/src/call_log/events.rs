@@ -1,14 +1,10 @@
 //! The calls of event mode.
 
 use fmu_description::Version;
-use slave::{CallError, EventInfo, Events, Slave, absent};
+use slave::{CallError, EventInfo, Events, Slave};
 
 use super::LoggedSlave;
-
-/// Returns the interface for the events of a slave; an error if the slave has none.
-fn events<S: Slave + ?Sized>(slave: &mut S) -> Result<&mut dyn Events, CallError> {
-    slave.events().ok_or_else(|| absent("fmi3EnterEventMode"))
-}
+use crate::error::events;
 
 impl<S: Slave + ?Sized> Events for LoggedSlave<S> {
     fn next_event(&mut self) -> Result<Option<f64>, CallError> {

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::function::Function;
 use super::perform::{invalid_command, reply};
-use slave::{CallError, Events, Slave, absent};
+use crate::error::events;
+use slave::{CallError, Events, Slave};
 
 /// A list that the master borrows from its caller, and that the worker owns after decoding.
 type List<'a, T> = Cow<'a, [T]>;
@@ -128,11 +129,6 @@ fn filled<T: Clone + Default>(
 ) -> Result<Vec<T>, CallError> {
     let mut values = vec![T::default(); count];
     fill(&mut values).map(|()| values)
-}
-
-/// Returns the interface for the events of an instance; an error for an instance without events.
-fn events(instance: &mut dyn Slave) -> Result<&mut dyn Events, CallError> {
-    instance.events().ok_or_else(|| absent("fmi3EnterEventMode"))
 }
 
 #[cfg(test)]
