@@ -6,6 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 from scipy.io import savemat
+from scipy.sparse import csc_array
 
 from design_oracle import COLUMN, design_and_report
 
@@ -186,6 +187,9 @@ def test_arrays_of_one_dimension_and_decimal_commas_are_the_same_plant(aso_ftc, 
     savemat(tmp_path / "struct.mat", {"plant": {"A": [[1.0]], "B": [[1.0]], "C": [[1.0]]}})
     done = aso_ftc("design", "--init", tmp_path / "struct.mat", "--out", tmp_path / "other.toml")
     assert done.returncode == 2 and "found none; those in a struct are not read" in done.stderr
+    savemat(tmp_path / "sparse.mat", {"A": csc_array([[0.0, 1.0], [0.0, -0.5]]), "B": [0.0, 0.5], "C": [1.0, 0.0]})
+    done = aso_ftc("design", "--init", tmp_path / "sparse.mat", "--out", tmp_path / "other.toml")
+    assert done.returncode == 2 and "found B, C; sparse matrices are not read" in done.stderr, done.stderr
 
 
 def test_matlab_variables_that_are_not_read_are_a_warning(aso_ftc, tmp_path):

@@ -35,8 +35,8 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
         };
         let missing = || {
             invalid(format!(
-                "expected the variables A, B and C, found {listed}; a log is a .csv or .parquet file, or results of \
-                 Dymola or OpenModelica"
+                "expected the variables A, B and C, found {listed}; sparse matrices are not read (in MATLAB full(A), \
+                 in scipy A.toarray()); a log is a .csv or .parquet file, or results of Dymola or OpenModelica"
             ))
         };
         matrix(name)?.ok_or_else(missing)
