@@ -95,6 +95,11 @@ pub(crate) fn norm_of(known: &KnownResponse, width: f64) -> Result<HInfinity, Er
     for frequency in std::iter::once(0.0).chain(known.resonances()) {
         best.raise_at(known, frequency)?;
     }
+    // A sampled system with real eigenvalues has no other resonances, and may be zero at both ends.
+    let is_at_end = best.frequency <= 0.0 || best.frequency >= frequency;
+    if system.domain != Domain::Continuous && is_at_end {
+        best.raise_at(known, original_frequency(1.0, system.domain))?;
+    }
     best.climb(known, width)?;
     for _ in 0..ROUNDS {
         if best.lower == 0.0 {

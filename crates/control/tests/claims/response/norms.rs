@@ -159,6 +159,17 @@ fn norms_agree_with_slycot() {
     }
 }
 
+/// z = 1 and z = -1 are zeros of 1 - z^-2, whose modulus is 2 |sin(w T)|.
+#[test]
+fn a_sampled_response_that_is_zero_at_both_ends_has_the_norm_of_the_middle() {
+    let domain = Domain::Sampled { period: 0.1 };
+    let mut comb = single(matrix(2, 2, &[0.0, 0.0, 1.0, 0.0]), &[1.0, 0.0], &[0.0, -1.0], domain);
+    comb.d[(0, 0)] = 1.0;
+    let norm = h_infinity(&comb, 1e-9).unwrap();
+    assert!((norm.lower - 2.0).abs() < 1e-8, "{norm:?}");
+    assert!((norm.frequency - 5.0 * PI).abs() < 1e-3, "{norm:?}");
+}
+
 /// The largest singular value on a dense grid is close to the norm and does not exceed it.
 #[test]
 fn no_frequency_exceeds_the_h_infinity_norm() {
