@@ -86,9 +86,10 @@ fn by_qr(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     let of_form = |m: &DMatrix<f64>| schur(m).map(|form| diagonal_blocks(&form.unpack().1));
     match (a.nrows() >= LARGE).then(without_form).flatten() {
         Some(eigenvalues) => Ok(eigenvalues),
-        None => of_form(&balanced)
-            .or_else(|error| without_form().ok_or(error))
-            .or_else(|_| of_form(&reflect(&balanced))),
+        None => of_form(&balanced).or_else(|error| without_form().ok_or(error)).or_else(|_| {
+            let h = reflection(balanced.nrows());
+            of_form(&(&h * &balanced * &h))
+        }),
     }
 }
 
@@ -106,14 +107,13 @@ where
     form.ok_or(Error::NotConverged { what: QR_ALGORITHM, iterations })
 }
 
-/// H M H with the reflection H = I - 2 v v' / (v'v), v = (1, 1/2, 1/3, ...).
+/// The reflection H = I - 2 v v' / (v'v), v = (1, 1/2, 1/3, ...), as a similarity H M H.
 ///
-/// The shifts of the QR algorithm do not converge on some matrices with many symmetries,
-/// permutations for example. The reflection breaks the symmetry and preserves the eigenvalues.
-fn reflect(m: &DMatrix<f64>) -> DMatrix<f64> {
-    let v = DVector::from_fn(m.nrows(), |i, _| 1.0 / as_number(i + 1));
-    let h = DMatrix::identity(v.len(), v.len()) - &v * v.transpose() * (2.0 / v.norm_squared());
-    &h * m * &h
+/// The shifts of the QR algorithm do not converge on some matrices with many symmetries, permutations and delays for
+/// example. The reflection breaks the symmetry and preserves the eigenvalues.
+pub(crate) fn reflection(order: usize) -> DMatrix<f64> {
+    let v = DVector::from_fn(order, |i, _| 1.0 / as_number(i + 1));
+    DMatrix::identity(order, order) - &v * v.transpose() * (2.0 / v.norm_squared())
 }
 
 /// Eigenvalues of a real block triangular matrix with blocks of order one and two.

@@ -1,7 +1,7 @@
 //! Lyapunov equations by substitution in Schur form.
 
 use crate::Error;
-use crate::eigen::schur;
+use crate::eigen::{reflection, schur};
 use nalgebra::{Complex, DMatrix};
 
 /// The complex Schur form A = U T U*, T upper triangular.
@@ -11,9 +11,16 @@ pub(super) struct Triangular {
 }
 
 impl Triangular {
+    /// Computes the form, by a reflected A if the QR algorithm does not converge for A.
     pub(super) fn new(a: &DMatrix<f64>) -> Result<Self, Error> {
-        let (u, t) = schur(&a.map(|entry| Complex::new(entry, 0.0)))?.unpack();
-        Ok(Self { u, t })
+        let complex = |m: &DMatrix<f64>| m.map(|entry| Complex::new(entry, 0.0));
+        if let Ok(form) = schur(&complex(a)) {
+            let (u, t) = form.unpack();
+            return Ok(Self { u, t });
+        }
+        let h = reflection(a.nrows());
+        let (u, t) = schur(&complex(&(&h * a * &h)))?.unpack();
+        Ok(Self { u: complex(&h) * u, t })
     }
 
     /// Solves A' P + P A = -Q: T* Y + Y T = -U* Q U column by column, forward in the rows; P = Re(U Y U*).

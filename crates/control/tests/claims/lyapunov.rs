@@ -56,6 +56,17 @@ fn an_indefinite_matrix_is_refused() {
     assert_eq!(refused, Err(Error::NotPositiveDefinite { matrix: "P" }));
 }
 
+/// y(k) = u(k - n): each state is kept for as many samples as it still passes.
+#[test]
+fn the_solution_of_a_delay_counts_its_samples() {
+    for (n, samples) in (1..8).zip(1..) {
+        let delay = integers(n, n, |i, j| i32::from(i == j + 1));
+        let p = discrete_lyapunov(&delay, &DMatrix::identity(n, n)).expect("a solution").p;
+        let expected = integers(n, n, |i, j| if i == j { samples - i } else { 0 });
+        assert!((&p - &expected).amax() < 1e-13, "{p}");
+    }
+}
+
 #[test]
 fn discrete_equations_agree_with_high_precision_as_well_as_scipy() {
     for case in cases(include_str!("../data/riccati.txt"), "lyapunov") {
