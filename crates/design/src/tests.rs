@@ -638,6 +638,18 @@ fn a_warning_of_slow_estimates_names_w() {
     assert!((time - 400.0).abs() < 0.1 && warning.contains("or a larger W"), "{warning}");
 }
 
+/// The plant is much faster than the bandwidths that the file asks for.
+#[test]
+fn estimates_as_fast_as_the_bandwidth_of_the_observer_are_no_warning() {
+    let text = "A = [[-10]]\nB = [[10]]\nC = [[1]]\nactuator_faults = \"all\"\n\
+                feedback.bandwidth = 0.1\nobserver.bandwidth = 0.3\n";
+    let warning = |file: &PlantFile<'_>| {
+        let designed = design(file).unwrap();
+        crate::assess::slow_estimates::warning(file, &designed.nominal).unwrap()
+    };
+    assert_eq!(read(text, warning).unwrap(), None);
+}
+
 /// The same loop in seconds and in nanoseconds: the gain of the integral is a rate.
 #[test]
 fn a_bandwidth_gives_fast_samples_the_integral_action_of_slow_ones() {
