@@ -113,7 +113,7 @@ pub(crate) fn remedies(
 }
 
 /// Returns a remedy for each peak of S that is above its limit only because signals without units count as equal: to
-/// state the units.
+/// state the units. A red peak may also become an amber one of less than half the height.
 fn of_units(nominal: &Solution, robustness: &Robustness, limits: &RobustnessLimits) -> Vec<Remedy> {
     let linear = &nominal.linear;
     let signals = [
@@ -122,7 +122,8 @@ fn of_units(nominal: &Solution, robustness: &Robustness, limits: &RobustnessLimi
     ];
     let remedy = |(point, (signals, kind)): (&LoopPoint, (&[Signal], &str))| {
         let is_unknown = have_no_units(signals);
-        let is_within = point.s_peak_scaled <= limits.amber;
+        let amber = limits.red.min(0.5 * point.judged);
+        let is_within = point.s_peak_scaled <= limits.amber.max(amber);
         let (_, reason) = peak_reason(point, limits).filter(|_| is_unknown && is_within)?;
         let change = format!(
             "state the unit of each {kind}: if they differ, the peak of S at the {} is judged in the units that make \
