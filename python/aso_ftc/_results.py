@@ -6,7 +6,7 @@ import importlib
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, cast
 
 from . import _core
@@ -257,7 +257,7 @@ class Results(Mapping[str, "NDArray[Any]"]):
             shown = [name for members in panels.values() for name in members]
             self._draw(ax, shown, ", ".join(filter(None, panels)))
             ax.set_xlabel("time in s")
-            return cast("matplotlib.figure.Figure", ax.figure)
+            return _shown_once(cast("matplotlib.figure.Figure", ax.figure))
         pyplot = _package("matplotlib.pyplot", "plot()")
         count = max(len(panels), 1)
         options = {"sharex": True, "squeeze": False, "figsize": (8, 1.5 + 2 * count), **options}
@@ -266,7 +266,7 @@ class Results(Mapping[str, "NDArray[Any]"]):
             self._draw(panel, members, unit)
         axes[-1, 0].set_xlabel("time in s")
         figure.tight_layout()
-        return figure
+        return _shown_once(figure)
 
     def _draw(self, axes: matplotlib.axes.Axes, names: list[str], unit: str) -> None:
         for name in names:
@@ -298,6 +298,26 @@ class Results(Mapping[str, "NDArray[Any]"]):
             rows.append([name, units[name] or "", *shown])
         head = ("variable", "unit", "min", "max", "last")
         return page(f"{self!r}"[1:-1], head, rows, len(names) - MOST_ROWS)
+
+
+def _shown_once(figure: Any) -> Any:
+    """Let a notebook show a picture once that a cell both draws and returns."""
+    pyplot = importlib.import_module("matplotlib.pyplot")
+    if "inline" in pyplot.get_backend() and getattr(figure, "number", None) in pyplot.get_fignums():
+        figure._ipython_display_ = partial(_display, figure)
+    return figure
+
+
+def _display(figure: Any) -> None:
+    """Close a picture that IPython shows now, and show those before it: the end of the cell would show it again."""
+    pyplot = importlib.import_module("matplotlib.pyplot")
+    for number in pyplot.get_fignums():
+        if number < figure.number:
+            importlib.import_module("IPython.display").display(pyplot.figure(number))
+            pyplot.close(number)
+    pyplot.close(figure)
+    # IPython shows the picture as any other.
+    raise NotImplementedError
 
 
 def _equal(one: NDArray[Any], other: NDArray[Any]) -> bool:

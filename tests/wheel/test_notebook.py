@@ -23,6 +23,30 @@ def test_the_notebook_runs_and_its_paper_observer_keeps_the_cart_within_1_mm(tmp
     assert len(swings) == 7 and swings == sorted(swings, reverse=True) and 0.9 < swings[-1] < 1.0
 
 
+def outputs(folder, *cells):
+    """Runs cells in a kernel; returns the outputs of each."""
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
+    nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(folder)}}).execute()
+    return [cell.outputs for cell in notebook.cells]
+
+
+def test_a_cell_shows_each_picture_once_in_the_order_of_its_lines(tmp_path):
+    pytest.importorskip("matplotlib")
+    shown = outputs(
+        tmp_path,
+        "import aso_ftc as af\nresults = af.paper().run(stop_time=0.1)\nfigure = results.plot('plant.x_p')",
+        "figure",
+        "results.plot('plant.x_p')\nresults.plot('plant.theta', figsize=(2, 2))",
+        "results.plot('plant.x_p');",
+        "import matplotlib.pyplot as plt\nresults.plot('plant.x_p', ax=plt.subplots()[1])",
+        "for _ in range(2):\n    print('next')\n    display(results.plot('plant.x_p'))",
+    )
+    kinds = [["image/png" if "image/png" in output.get("data", {}) else output.text for output in cell] for cell in shown]
+    assert kinds == [["image/png"], ["image/png"], ["image/png"] * 2, ["image/png"], ["image/png"], ["next\n", "image/png"] * 2]
+    assert "200x200" in shown[2][1]["data"]["text/plain"] and "200x200" not in shown[2][0]["data"]["text/plain"]
+
+
 def test_tab_completes_the_names_of_variables_in_brackets():
     shell = pytest.importorskip("IPython.core.interactiveshell").InteractiveShell()
     description = af.read_model_description(af.fmus()["FrictionPendulum"])
