@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import pickle
 
 import aso_ftc as af
 import numpy as np
@@ -357,6 +358,20 @@ def test_numbers_of_numpy_and_distributions_of_scipy_are_entries():
 
 
 def test_tables_have_names_of_python_or_of_the_file():
+def test_a_campaign_travels():
+    parameters = {
+        "plant.F_c": stats.norm(25.0, 2.0),
+        "plant.F_s": {"from": 28.0, "to": 32.0, "logarithmic": True},
+        "controller.compensate": [True, False],
+        "n": {"distribution": "poisson", "mu": 3.0, "set": "algorithm.jobs"},
+    }
+    one = paper(parameters=parameters, design={"method": "latin-hypercube", "runs": 8})
+    other = pickle.loads(pickle.dumps(one))
+    assert other.describe() == one.describe() and columns(other) == columns(one)
+    for ours, theirs in zip(one.parameters, other.parameters, strict=True):
+        assert list(ours.quantile(np.array([0.0, 0.3]))) == list(theirs.quantile(np.array([0.0, 0.3])))
+
+
     stop_times = [
         Campaign("paper", experiment={name: 0.1}, measures=MEASURES).system.experiment["stop-time"]
         for name in ("stop_time", "stop-time")

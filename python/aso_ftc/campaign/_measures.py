@@ -223,6 +223,9 @@ class Expression:
         except RecursionError:
             raise self._wrong("the expression is nested too deeply") from None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Expression, (self._name, self.text)
+
     def _wrong(self, text: str) -> ConfigurationError:
         place = f"measures.{self._name}"
         return ConfigurationError(f"{place}: {text}", "Campaign", {"name": place})

@@ -7,6 +7,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +144,11 @@ def _listed(place: str, entries: dict[str, Any], _: Any) -> tuple[Any, Any]:
     if not all(isinstance(value, (bool, int, float, str)) for value in values):
         raise fail(place, "values: expected numbers, true, false or texts")
     levels = tuple(values)
-    return levels, lambda unit: [levels[int(i)] for i in np.minimum(unit * len(levels), len(levels) - 1)]
+    return levels, partial(_level, levels)
+
+
+def _level(levels: tuple[Any, ...], unit: Numbers) -> list[Any]:
+    return [levels[int(i)] for i in np.minimum(unit * len(levels), len(levels) - 1)]
 
 
 def _between(place: str, entries: Mapping[str, Any], low: float, high: float) -> tuple[Any, Any]:
@@ -155,18 +160,20 @@ def _between(place: str, entries: Mapping[str, Any], low: float, high: float) ->
     if logarithmic and low <= 0:
         raise fail(place, f"from = {low}: a logarithmic range starts above 0")
 
-    def quantile(unit: Numbers) -> Any:
-        linear = low + unit * (high - low)
-        value = np.exp(np.log(low) + unit * (np.log(high) - np.log(low))) if logarithmic else linear
-        # The rounded value at an end may be beyond it.
-        return np.clip(value, low, high)
-
+    quantile = partial(_in_range, low, high, logarithmic)
     levels = None
     if "steps" in entries:
         steps = whole(f"{place}.steps", entries["steps"], 2, MOST_RUNS)
         inner = quantile(np.linspace(0.0, 1.0, steps))[1:-1]
         levels = (low, *(float(value) for value in inner), high)
     return levels, quantile
+
+
+def _in_range(low: float, high: float, logarithmic: bool, unit: Numbers) -> Any:
+    linear = low + unit * (high - low)
+    value = np.exp(np.log(low) + unit * (np.log(high) - np.log(low))) if logarithmic else linear
+    # The rounded value at an end may be beyond it.
+    return np.clip(value, low, high)
 
 
 def _range(place: str, entries: dict[str, Any], _: Any) -> tuple[Any, Any]:
@@ -202,7 +209,7 @@ def _distribution(place: str, entries: dict[str, Any], _: Any) -> tuple[Any, Any
         quantile = name.ppf if hasattr(name, "ppf") else name.icdf
         if not np.isfinite(quantile(np.array([0.25, 0.5, 0.75]))).all():
             raise fail(place, "the distribution has no quantiles: its arguments are out of range")
-        return None, _integers(name) if isinstance(getattr(name, "dist", None), stats.rv_discrete) else quantile
+        return None, partial(_integers, name) if isinstance(getattr(name, "dist", None), stats.rv_discrete) else quantile
     family: Any = getattr(stats, name, None) if isinstance(name, str) else None
     discrete = isinstance(family, stats.rv_discrete)
     if not isinstance(family, stats.rv_continuous) and not discrete:
@@ -218,16 +225,16 @@ def _distribution(place: str, entries: dict[str, Any], _: Any) -> tuple[Any, Any
     frozen = family(**{key: _number(place, key, entries[key]) for key in allowed if key in entries})
     if not np.isfinite(frozen.ppf([0.25, 0.5, 0.75])).all():
         raise fail(place, f"distribution {name} has no quantiles for these entries: they are out of range")
-    return None, _integers(frozen) if discrete else frozen.ppf
+    return None, partial(_integers, frozen) if discrete else frozen.ppf
 
 
-def _integers(frozen: Any) -> Callable[[Numbers], Sequence[Any]]:
+def _integers(frozen: Any, unit: Numbers) -> list[Any]:
     """Return the quantiles of a discrete distribution as integers; an end that it does not have is infinite.
 
     At the position 0 scipy has the number below the smallest one.
     """
-    lowest = frozen.support()[0]
-    return lambda unit: [int(value) if np.isfinite(value) else value for value in np.maximum(frozen.ppf(unit), lowest)]
+    values = np.maximum(frozen.ppf(unit), frozen.support()[0])
+    return [int(value) if np.isfinite(value) else value for value in values]
 
 
 @dataclass(frozen=True)
