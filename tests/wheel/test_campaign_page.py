@@ -53,7 +53,7 @@ class Page(html.parser.HTMLParser):
 
 
 def page(outcome, path):
-    outcome.page(path)
+    assert outcome.page(path) == path
     return Page(path)
 
 

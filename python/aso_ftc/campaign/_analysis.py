@@ -595,8 +595,8 @@ class Outcome:
         result: pandas.DataFrame = cells.unstack(["size", "from"]).sort_index().sort_index(axis=1)
         return result
 
-    def page(self, path: str | os.PathLike[str], force: bool = False) -> None:
-        """Write an HTML page of the campaign: one file that needs no network.
+    def page(self, path: str | os.PathLike[str], force: bool = False) -> Path:
+        """Write an HTML page of the campaign, one file that needs no network, and return its path.
 
         Args:
             path: the file to write.
@@ -608,6 +608,17 @@ class Outcome:
 
 
 def describe(limit: Mapping[str, float] | None) -> str:
+        return Path(path)
+
+
+def warn_of_measures(outcome: Outcome) -> bool:
+    """Warn of runs that count as failed because a measure of theirs failed; return whether there are any."""
+    reasons = outcome.read(["reason"])["reason"][outcome.unfinished].astype(str)
+    failed = reasons[reasons.str.startswith(MEASURE)]
+    if len(failed):
+        sentence = f"{len(failed)} of {len(outcome)} runs failed in a measure; run {failed.index[0]}: {failed.iloc[0]}"
+        warnings.warn(f"{sentence} ({NO_VALUE})", stacklevel=4)
+    return len(failed) > 0
     """Return a limit as text, such as ``"below 0.001"``."""
     return " and ".join(f"{word} {value:g}" for word, value in (limit or {}).items())
 
