@@ -6,7 +6,7 @@ import contextlib
 import json
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from . import _core, _plant
@@ -80,12 +80,18 @@ def entries_of(plant: object) -> tuple[dict[str, Any], str]:
 def _of_entries(entries: Mapping[str, Any], path: str) -> Design:
     stated = {name: _plant.stated(value, name) for name, value in entries.items() if value is not None}
     stated = _plant.with_names(stated)
-    try:
+    with _without_place(is_file=False):
         return Design(_core.design_plant(stated, path), path, stated)
+
+
+@contextlib.contextmanager
+def _without_place(*, is_file: bool) -> Iterator[None]:
+    """Let an error of a plant that nobody wrote to a file name the entry alone."""
+    try:
+        yield
     except DesignError as error:
-        if "message" not in error.fields:
+        if is_file or "message" not in error.fields:
             raise
-        # Nobody wrote a file: the message names the entry.
         raise DesignError(error.fields["message"], error.kind) from None
 
 
@@ -95,6 +101,7 @@ class Design:
     def __init__(self, designed: _core.Designed, path: str, entries: dict[str, Any] | None = None) -> None:
         self._designed = designed
         self._path = path
+        self._is_file = entries is None
         self._entries = entries
         self._report: dict[str, Any] | None = None
 
@@ -337,6 +344,9 @@ class Controller:
     def __reduce__(self) -> tuple[Any, ...]:
         return Controller, (self._design,)
 
+    def _errors(self) -> contextlib.AbstractContextManager[None]:
+        return _without_place(is_file=self._design._is_file)
+
     @property
     def system(self) -> Any:
         """The controller from measurements to commands, limits aside, as a ``control.StateSpace``."""
@@ -350,7 +360,8 @@ class Controller:
             path: the file to write.
             base: the packed controller from which it is made; default: that of this package.
         """
-        self._designed.fmu(_controller(base), os.fspath(path))
+        with self._errors():
+            self._designed.fmu(_controller(base), os.fspath(path))
         return os.fspath(path)
 
     def kalman_fmu(self, path: PathLike, *, base: PathLike) -> str:
@@ -360,7 +371,8 @@ class Controller:
             path: the file to write.
             base: the packed filter from which it is made, ``KalmanFilter.fmu`` of ``aso-ftc pack fmu-kalman``.
         """
-        note = self._designed.kalman_fmu(os.fspath(base), os.fspath(path))
+        with self._errors():
+            note = self._designed.kalman_fmu(os.fspath(base), os.fspath(path))
         if note is not None:
             warnings.warn(note, stacklevel=2)
         return os.fspath(path)
@@ -372,7 +384,8 @@ class Controller:
             path: the file to write.
             base: the packed controller from which it is made; default: that of this package.
         """
-        self._designed.feedback_fmu(_controller(base), os.fspath(path))
+        with self._errors():
+            self._designed.feedback_fmu(_controller(base), os.fspath(path))
         return os.fspath(path)
 
     def c_code(self, folder: PathLike, *, single: bool = False) -> list[str]:
@@ -392,7 +405,8 @@ class Controller:
         return self._code(folder, True, single)
 
     def _code(self, folder: PathLike, rust: bool, single: bool) -> list[str]:
-        files, notes = self._designed.code(rust, single)
+        with self._errors():
+            files, notes = self._designed.code(rust, single)
         paths = []
         for name, text in files:
             path = os.path.join(os.fspath(folder), name)

@@ -132,6 +132,10 @@ def test_a_kalman_filter_needs_the_fmu_of_the_plant(design, tmp_path):
         design.controller.kalman_fmu(tmp_path / "Filter.fmu", base=af.fmus()["AsoController"])
     with pytest.raises(af.DesignError, match="states an FMU"):
         design.controller.feedback_fmu(tmp_path / "Filter.fmu")
+    # Of entries in Python there is no file to name.
+    with pytest.raises(af.DesignError, match="^no Kalman filter with the plant's FMU: .* states an FMU$") as caught:
+        design.with_().controller.kalman_fmu(tmp_path / "Filter.fmu", base=af.fmus()["AsoController"])
+    assert "path" not in caught.value.fields
     assert not (tmp_path / "Filter.fmu").exists()
 
 
