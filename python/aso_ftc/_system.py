@@ -19,6 +19,7 @@ from ._description import Variable
 from ._errors import ConfigurationError, Error
 from ._html import page
 from ._keywords import keywords
+from ._progress import of_run
 from ._results import Results
 
 if TYPE_CHECKING:
@@ -407,7 +408,7 @@ class System:
             memory_limit: limit of the memory of an isolated FMU, in bytes or as ``"2GiB"``.
             time_limit: limit of the run from loading to the last step, in s of wall-clock time, checked between steps.
             cancel: ends the run from another thread.
-            progress: ``True`` for a bar on a terminal, or a function of the fraction done, 0 to 1.
+            progress: ``True`` for a bar on a terminal, a line in a notebook; or a function of the fraction done, 0 to 1.
             file: also write the results to this ``.csv`` or ``.parquet`` file.
 
         Raises:
@@ -438,7 +439,7 @@ class System:
         return self._run(changes, time_limit=time_limit, cancel=cancel, progress=progress)
 
     def _run(self, changes: dict[str, Any], **options: Any) -> Results:
-        outcome, stop = self._study().run(changes, **options)
+        outcome, stop = self._study().run(changes, **{**options, "progress": of_run(options.get("progress"))})
         results, error = Results(outcome), cast("Any", stop)
         if error is None:
             return results

@@ -47,6 +47,19 @@ def test_a_cell_shows_each_picture_once_in_the_order_of_its_lines(tmp_path):
     assert "200x200" in shown[2][1]["data"]["text/plain"] and "200x200" not in shown[2][0]["data"]["text/plain"]
 
 
+def test_progress_is_a_line_that_is_drawn_again(tmp_path):
+    pytest.importorskip("distributed")
+    _, run, campaign = outputs(
+        tmp_path,
+        "import aso_ftc as af\nsystem = af.paper()\nsystem.experiment['stop-time'] = 0.1",
+        "results = system.run(progress=True)",
+        "outcome = af.campaign.Campaign(system, measures={'peak': 'max(plant.x_p)'}).run('out', workers=1)",
+    )
+    for parts, text in ((run, "100 % in "), (campaign, "1 of 1 runs")):
+        line = "".join(output.text for output in parts if output.name == "stderr")
+        assert line.startswith("\r") and text in line and line.endswith("\n")
+
+
 def test_tab_completes_the_names_of_variables_in_brackets():
     shell = pytest.importorskip("IPython.core.interactiveshell").InteractiveShell()
     description = af.read_model_description(af.fmus()["FrictionPendulum"])

@@ -441,7 +441,7 @@ class Campaign:
             folder: the folder of the campaign, a new one or one where this campaign was interrupted.
             workers: number of local processes; default: the number of processors.
             scheduler: the address of a Dask scheduler instead of local processes.
-            progress: show a line with the progress on a terminal.
+            progress: show a line with the progress on a terminal and in a notebook.
             live: serve a page on this machine that shows the runs while they are done; gets its address.
 
         Raises:

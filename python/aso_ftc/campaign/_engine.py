@@ -23,6 +23,7 @@ import numpy as np
 
 from .._core import LiveView
 from .._errors import ConfigurationError, Error
+from .._progress import draw, has_lines
 from ._analysis import Outcome, load
 from ._campaign import Campaign
 from ._folder import Folder, column
@@ -365,7 +366,7 @@ class _Work:
         self.campaign, self.folder = campaign, folder
         self.total, self.size = len(campaign), campaign.runs_per_task
         self.done = set(folder.parts())
-        self.progress = _Progress(self.total, progress and sys.stderr.isatty())
+        self.progress = _Progress(self.total, progress and has_lines())
         for first in self.done:
             self.progress.add(min(self.size, self.total - first), 0)
         # Rows of parts that are not whole yet, by the first run of the part.
@@ -589,7 +590,7 @@ def _lost(run: int, measures: Mapping[str, float]) -> Row:
 
 
 class _Progress:
-    """One line on a terminal."""
+    """One line on a terminal or in a notebook."""
 
     def __init__(self, total: int, shown: bool) -> None:
         self.total, self.shown = total, shown
@@ -608,8 +609,7 @@ class _Progress:
         rate = (self.count - self._known) / (now - self._begin) if now > self._begin else 0.0
         left = f", {rate:.1f} runs/s, {(self.total - self.count) / rate:.0f} s left" if rate > 0 else ""
         bad_text = f", {self.bad} did not finish" if self.bad else ""
-        text = f"{self.count} of {self.total} runs{bad_text}{left}"
-        print(f"\r{text:<78}", end="", file=sys.stderr, flush=True)
+        draw(f"{self.count} of {self.total} runs{bad_text}{left}")
 
     def close(self) -> None:
         """End the line."""
