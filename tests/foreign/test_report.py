@@ -668,6 +668,20 @@ def test_labels_of_ticks_are_whole_and_apart_and_above_1e32_too(aso_ftc, write, 
 
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_a_range_above_the_largest_number_is_drawn_and_a_long_name_fits_a_narrow_screen(aso_ftc, write, tmp_path):
+    report(aso_ftc, write("own.csv", pd.DataFrame({"time": [0.0, 10.0], 10 * "a_long_name.": [-1.7e308, 1.7e308]})))
+    with browser(tmp_path / "profile", 390) as page:
+        page.call("Page.addScriptToEvaluateOnNewDocument", source=TEXTS)
+        page.open((tmp_path / "own.html").as_uri())
+        page.until(DRAWN)
+        width, beyond = page.evaluate("[document.querySelector('.u-over').clientWidth, document.documentElement.scrollWidth - innerWidth]")
+        assert beyond <= 0
+        # The axis ends at half of the largest number: the straight line is inside for this part of the time.
+        assert (np.array(inked(page, "0072b2")) > 0).sum() == pytest.approx(width * 1.797 / 3.4, rel=0.03)
+        assert "5e+307" in page.evaluate("Array.from(texts.values()).flat().map(([text]) => text)")
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_rows_at_one_time_are_drawn_also_where_times_are_seconds_apart(aso_ftc, write, tmp_path):
     with browser(tmp_path / "profile") as page:
         # The next number after 1e15 is 0.125 away, that after 1e17 is 16 away.

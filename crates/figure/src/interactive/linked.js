@@ -237,7 +237,8 @@ class LinkedAxis {
       padding: [8 * scale, () => Math.max(12 * scale, beyond), 0, 0],
       scales: {
         x: { time: false, distr: this.isLogarithmic ? 3 : 1, range: (self, low, high) => [low, high] },
-        y: { distr: isLogarithmic ? 3 : 1, range: (self, low, high) => this.heights.get(self) ?? this.vertical(low, high, isLogarithmic, fromZero, self) },
+        /* 100 is a scale of these functions: lengths of a quarter do not overflow. */
+        y: { distr: isLogarithmic ? 3 : 100, fwd: (value) => value / 4, bwd: (value) => value * 4, range: (self, low, high) => this.heights.get(self) ?? this.vertical(low, high, isLogarithmic, fromZero, self) },
       },
       axes: [
         { ...axis(true, this.isLogarithmic), label: this.label, labelSize: 20 * scale, size: 30 * scale },
@@ -310,7 +311,10 @@ class LinkedAxis {
     const [bottom, top] = fromZero && this.range === null ? [Math.min(low, 0), Math.max(high, 0)] : [low, high];
     const size = Math.max(Math.abs(bottom), Math.abs(top));
     const air = top - bottom > 1e-12 * size ? 0.06 * (top - bottom) : 0.1 * size || 1;
-    return [bottom - air, top + air];
+    const cut = (ends, most) => ends.map((end) => Math.min(Math.max(end, -most), most));
+    const ends = cut([bottom - air, top + air], Number.MAX_VALUE);
+    /* An axis whose length overflows has no ticks. */
+    return Number.isFinite(ends[1] - ends[0]) ? ends : cut(ends, Number.MAX_VALUE / 2);
   }
 
   /* The room that the labels of an axis take. */
