@@ -151,6 +151,13 @@ def test_the_claims_are_those_of_the_readme_in_its_words_and_units(open_page):
     assert "0.962 mm" in page.evaluate("document.getElementById('summary').textContent")
 
 
+def test_a_number_that_rounds_to_zero_has_no_sign(open_page):
+    page = open_page("#stop=1.2")
+    results = rows(run_to_the_end(page))
+    assert -0.005 < results["plant.f_fric"][-1] - results["controller.f_hat"][-1] < 0
+    page.until("document.getElementById('now-estimate').textContent.endsWith('f_fric − f_hat = 0.00 N')", limit=10)
+
+
 def test_the_page_loads_at_most_303_kb_at_first(tmp_path):
     requested = []
     with served(PAGE, requested) as address, browser(tmp_path / "profile") as page:

@@ -298,7 +298,7 @@
     id(name).querySelector("g").setAttribute("transform", `rotate(${(theta * 180) / Math.PI} 0 0.03)`);
   }
 
-  const quantity = (value, unit, places) => `${value.toFixed(places).replace("-", "−")} ${unit}`;
+  const quantity = (value, unit, places) => `${(Number(value.toFixed(places)) + 0).toFixed(places).replace("-", "−")} ${unit}`;
   function draw(now) {
     if (fresh && last) {
       fresh = false;

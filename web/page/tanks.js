@@ -312,7 +312,7 @@
     document.body.dataset.ready = "true";
     if (!matchMedia("(prefers-reduced-motion: reduce)").matches) play(true);
   }).catch((error) => {
-    Object.assign(id("decision"), { textContent: `tanks.wasm cannot be started: ${error.message}. Serve the folder: python3 -m http.server`, className: "bad" });
+    Object.assign(id("decision"), { textContent: `tanks.wasm cannot be started: ${error.message.replace(/\.$/u, "")}. Serve the folder: python3 -m http.server`, className: "bad" });
   });
   window.tanks = {
     get rows() {
