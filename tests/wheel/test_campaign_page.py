@@ -68,6 +68,7 @@ def test_the_page_is_one_file_that_makes_no_request(tmp_path):
     assert "default-src 'none'" in policy and "http" not in policy and "connect-src" not in policy
     style = document.source[document.source.index("<style>") : document.source.index("</style>")]
     assert "url(" not in style and "@import" not in style
+    assert "need JavaScript" in document.text
     assert "plotly.js v" in document.library and sorted(path.name for path in tmp_path.iterdir()) == [
         "c",
         "p.html",
@@ -360,11 +361,13 @@ def test_a_browser_draws_the_page_and_a_click_shows_the_command(tmp_path):
     result = """[byId('point').querySelector('code').textContent,
       byId('scatter').data.map(own => own.x.length), byId('heat').data.length, byId('histogram-0').data.length,
       [...byId('scatter').querySelectorAll('.modebar-btn')].map(own => own.dataset.title),
-      performance.getEntriesByType('resource').length]"""
-    command, points, heat, histogram, buttons, requests = in_a_browser(outcome, tmp_path, script, result)
+      performance.getEntriesByType('resource').length, byId('parallel-note').textContent]"""
+    command, points, heat, histogram, buttons, requests, note = in_a_browser(outcome, tmp_path, script, result)
     assert (
         command == outcome.command(2) and sum(points) == 7 and heat == 1 and histogram == 2 and requests == 0
     )
+    # Faults that are stuck have no size.
+    assert note == "A run without a value of a parameter is at the lower end of its axis."
     assert [button.lower() for button in buttons] == ["download plot as a png", "zoom", "pan", "reset axes"]
 
 
@@ -378,3 +381,13 @@ def test_a_run_that_did_not_finish_is_drawn_as_a_failure_whatever_value_its_meas
     assert outcome.failed("y").sum() == 20
     traces = "['border', 'scatter'].map(name => byId(name).data.filter(own => own.mode === 'markers').map(own => own.x.length))"
     assert in_a_browser(outcome, tmp_path, "", traces) == [[20, 20], [20, 20]]
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs the browser chromium")
+def test_the_texts_of_the_first_of_parallel_axes_are_whole(tmp_path):
+    columns = {"connection": np.array(["a.controller.with.long.name", "b"] * 10, dtype=object)}
+    outcome = write(tmp_path / "c", {"method": "random"}, columns, {"y": np.arange(20.0)})
+    texts = """[...byId('parallel').querySelectorAll('.axis text')].map(own =>
+      [own.textContent, own.getBoundingClientRect().left - byId('parallel').getBoundingClientRect().left])"""
+    lefts = dict(in_a_browser(outcome, tmp_path, "", texts))
+    assert lefts["a.controller.with.long.na…"] >= 0

@@ -132,7 +132,7 @@ def _page(outcome: Outcome, script: str) -> str:
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">{_MARK}{_POLICY}'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>Campaign {name}</title><style>\n{style}</style></head>\n<body><h1>Campaign {name}</h1>{body}\n"
+        f"<title>Campaign {name}</title><style>\n{style}</style></head>\n<body><h1>Campaign {name}</h1>{_NOSCRIPT}{body}\n"
         f'<script type="text/plain" id="plotly">{_packed(script)}</script>\n'
         f'<script type="text/plain" id="data">{_packed(embedded)}</script>\n'
         f"<script>\n'use strict';\n(async () => {{\n{drawing}}})();\n</script></body></html>\n"
@@ -329,7 +329,7 @@ def _parameters(outcome: Outcome) -> str:
                 levels = sorted(str(value) for value in frame[name].unique())
                 more = f" and {len(levels) - 5:,} more" if len(levels) > 5 else ""
                 rows.append(_row([name, units[name] or "", ", ".join(levels[:5]) + more, ""]))
-    return _table(("parameter", "unit", "lowest", "highest"), rows)
+    return _table(("parameter", "unit", "lowest", "highest"), rows) if rows else ""
 
 
 # Limits and failures.
@@ -606,6 +606,10 @@ def _columns(outcome: Outcome, measures: list[str], rows: NDArray[np.int64]) -> 
     return columns
 
 
+_NOSCRIPT = (
+    "<noscript><p>The pictures need JavaScript. Without it, the tables of all measures follow each other, in the order "
+    "of the list.</p></noscript>"
+)
 # No source is allowed: the browser itself refuses any request. plotly.js compiles its WebGL code (eval).
 _POLICY = (
     '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '

@@ -97,14 +97,14 @@ function drawParallel() {
   const known = data.runs.map((_, at) => at).filter(at => all[at] !== null);
   const count = Math.min(known.length, LINES);
   const rows = Array.from({length: count}, (_, at) => known[Math.floor((at * known.length) / count)]);
-  byId('parallel-note').textContent = count < known.length ? 'Of the runs that are drawn below, ' + count
-    + ' have a line here.' : '';
+  const isPartial = inputs.some(from => rows.some(at => from.values[at] === null) && rows.some(at => from.values[at] !== null));
+  byId('parallel-note').textContent = (count < known.length ? 'Of the runs that are drawn below, ' + count
+    + ' have a line here. ' : '') + (isPartial ? 'A run without a value of a parameter is at the lower end of its axis.' : '');
   const scaled = value => own.logarithmic ? Math.log10(value) : value;
   const dimension = (from, pick) => {
     const picked = rows.map(pick), finite = picked.filter(value => value !== null);
     let low = finite.reduce((a, b) => Math.min(a, b), Infinity), high = finite.reduce((a, b) => Math.max(a, b), -Infinity);
     if (!(low < high)) { const half = Math.abs(low) / 10 || 1; low -= half; high += half; }
-    // A run without a value of this axis, such as the size of a fault that has none, is at its lower end.
     const label = plain(short(from.name + (from.unit ? ' in ' + from.unit : ''), 26));
     return {label, values: picked.map(value => value === null ? low : value), range: [low, high]};
   };
@@ -131,9 +131,11 @@ function drawParallel() {
   if (!rows.length) { Plotly.purge(place); place.textContent = 'No run has a finite value of this measure.'; return; }
   if (!place.data) place.textContent = '';
   place.style.width = Math.max(place.parentElement.clientWidth, 120 * (dimensions.length + 1)) + 'px';
+  // The labels of the first axis are left of it.
+  const left = Math.max(60, ...(dimensions[0]?.ticktext ?? []).map(text => 15 + 6 * text.length));
   Plotly.react(place, [{type: 'parcoords', dimensions: axes, line, labelangle: -15, labelside: 'top',
     labelfont: {size: 12}, tickfont: {size: 10}, rangefont: {size: 1, color: 'rgba(0,0,0,0)'}}],
-    layout({height: 440, margin: {l: 60, r: 60, t: 90, b: 20}}), {...options, displayModeBar: false});
+    layout({height: 440, margin: {l: left, r: 60, t: 90, b: 20}}), {...options, displayModeBar: false});
 }
 
 function drawScatter() {
