@@ -151,6 +151,16 @@ def test_the_claims_are_those_of_the_readme_in_its_words_and_units(open_page):
     assert "0.962 mm" in page.evaluate("document.getElementById('summary').textContent")
 
 
+def test_the_page_describes_an_experiment_only_with_its_values(open_page):
+    page = open_page("#F_c=12.5&F_s=15&stop=20")
+    text = "document.getElementById('preset-text').textContent"
+    assert "half as large" in page.evaluate(text)
+    state(page, "t_on", "30")
+    assert page.evaluate(text) == ""
+    click(page, "defaults")
+    assert "from 40 s on" in page.evaluate(text)
+
+
 def test_a_number_that_rounds_to_zero_has_no_sign(open_page):
     page = open_page("#stop=1.2")
     results = rows(run_to_the_end(page))

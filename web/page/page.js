@@ -83,6 +83,7 @@
       showError(field, "");
     }
     showActing();
+    showPreset();
   }
 
   function refuse(field, text) {
@@ -104,6 +105,7 @@
     if (field.at === "begin") restart(state === "running" || isToRun);
     else if (field.variable) set(field.variable, values[field.id]);
     showActing();
+    showPreset();
     write();
   }
 
@@ -129,6 +131,12 @@
     id("link-text").textContent = without > 0 ? `It leaves out the ${without} changes made during the run: they are too many for a link.`
       : all.length > 0 ? `It restores the ${all.length} changes made during the run, too.` : "";
     id("native").textContent = systemToml(begun, gains, changes);
+  }
+
+  // What the experiment is that has these values.
+  function showPreset() {
+    id("preset-text").textContent = PRESETS.find((preset) => FIELDS.every((field) => ["compensate", "push", "stop"].includes(field.id)
+      || values[field.id] === (preset.values[field.id] ?? field.value)))?.text ?? "";
   }
 
   function showActing() {
@@ -210,13 +218,9 @@
   });
   for (const preset of PRESETS) {
     const button = element("button", { type: "button", textContent: preset.label });
-    button.addEventListener("click", () => {
-      load(preset.values);
-      id("preset-text").textContent = preset.text;
-    });
+    button.addEventListener("click", () => load(preset.values));
     id("presets").append(button);
   }
-  id("preset-text").textContent = PRESETS[0].text;
 
   // --- The tour ---
 
