@@ -198,6 +198,9 @@ def test_integers_that_doubles_cannot_hold_are_named(aso_ftc, write):
         page, _ = report(aso_ftc, write(name, results))
         (warning,) = page.xpath("//main//p[@class='outcome warned']")
         assert warning.text_content().endswith("not seen: large."), warning.text_content()
+    other = write("other.csv", results.assign(large=results["large"] - 1))
+    _, said = report(aso_ftc, write("rows.csv", results), "--against", other)
+    assert "not compared: digits of integers beyond 2^53, which are rounded: large\n" in said
 
 
 def test_numbers_have_six_digits_and_zero_no_sign(aso_ftc, write):

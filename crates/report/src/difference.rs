@@ -41,6 +41,8 @@ pub struct Comparison {
     pub only_there: Vec<String>,
     /// Variables of this run that are texts, which are not compared.
     pub texts: Vec<String>,
+    /// Integers of this run with values that a double cannot distinguish from their neighbours.
+    pub rounded: Vec<String>,
     /// Number of variables of this run that are beyond [`VARIABLES`](crate::VARIABLES) and are not compared.
     pub left_out: usize,
     /// Number of rows of this run that were compared.
@@ -78,6 +80,10 @@ impl Comparison {
         }
         if !self.texts.is_empty() {
             sentences.push(format!("texts: {}", crate::listed(&self.texts, limit)));
+        }
+        if !self.rounded.is_empty() {
+            let names = crate::listed(&self.rounded, limit);
+            sentences.push(format!("digits of integers beyond 2^53, which are rounded: {names}"));
         }
         if self.left_out > 0 {
             sentences.push(format!(

@@ -225,6 +225,7 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
     }
     let signals = Signals::new(columns, request.run);
     let groups = plots::groups(columns, statistics, &signals, rows, request.against.is_some());
+    let rounded = rounded(columns, statistics);
     let (compared, samples) = match request.against {
         Some(path) => {
             let other = Table::open(path)?;
@@ -239,6 +240,7 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
                 comparison.only_there = difference::missing(&other, &all, &table);
             }
             (comparison.texts, comparison.left_out) = (texts.clone(), left_out);
+            comparison.rounded.clone_from(&rounded);
             (Some(compared), samples)
         }
         None => (None, collect(&view, positions, &groups)?),
@@ -265,6 +267,7 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
         events: &read.events,
         span: &read.span,
         texts,
+        rounded: &rounded,
         left_out,
         frames: frames.as_deref(),
         comparison: compared.as_ref().map(|compared| &compared.comparison),
@@ -427,6 +430,16 @@ fn interval((from, to): (f64, f64)) -> String {
 /// Returns the name of a file, without its folder.
 fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Returns the names of the integers with values that a double cannot distinguish from their neighbours.
+fn rounded(columns: &[Column], statistics: &[Statistics]) -> Vec<String> {
+    let is_rounded = |(column, of): &(&Column, &Statistics)| {
+        let size = of.smallest.0.abs().max(of.largest.0.abs());
+        matches!(column.kind, ColumnKind::Integer | ColumnKind::Long) && size >= 2_f64.powi(53)
+    };
+    let rounded = columns.iter().zip(statistics).filter(is_rounded);
+    rounded.map(|(column, _)| column.name.clone()).collect()
 }
 
 /// Formats names for a sentence: at most `limit` of them, and the number of further ones.

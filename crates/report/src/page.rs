@@ -6,7 +6,7 @@ use figure::interactive::{
     BASE_STYLE, COLOURS, FOLD, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE, USAGE,
 };
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use results::{Column, ColumnKind};
+use results::Column;
 
 use serde::Serialize;
 
@@ -42,6 +42,8 @@ pub(crate) struct Content<'a> {
     pub(crate) span: &'a [f64],
     /// Variables that are texts.
     pub(crate) texts: &'a [String],
+    /// Integers that are rounded to doubles.
+    pub(crate) rounded: &'a [String],
     /// Number of variables that are not shown.
     pub(crate) left_out: usize,
     /// The frames of the bus trace by bus and identifier, if there is a trace.
@@ -101,7 +103,12 @@ pub(crate) fn render(content: &Content<'_>, plots: &Plots) -> String {
                         @if content.left_out > 0 {
                             p { (content.left_out) " more variables of the file are not shown; " code { "--variables" } " chooses others." }
                         }
-                        (rounded(content))
+                        @if !content.rounded.is_empty() {
+                            p.outcome.warned {
+                                "Integers beyond 2" sup { "53" } " = 9007199254740992 are rounded, and differences below the rounding are not seen: "
+                                (listed(content.rounded, LISTED)) "."
+                            }
+                        }
                         @if !content.texts.is_empty() { p { "Texts are not shown: " (listed(content.texts, LISTED)) "." } }
                         details.said.stays {
                             summary { "How to zoom, read values and differences, by mouse, keyboard and touch" }
@@ -269,24 +276,6 @@ fn unchanged(content: &Content<'_>) -> Markup {
                         }
                     }
                 }
-            }
-        }
-    }
-}
-
-/// Names the integers with values that a double cannot distinguish from their neighbours.
-fn rounded(content: &Content<'_>) -> Markup {
-    let is_rounded = |(column, of): &(&Column, &Statistics)| {
-        let size = of.smallest.0.abs().max(of.largest.0.abs());
-        matches!(column.kind, ColumnKind::Integer | ColumnKind::Long) && size >= 2_f64.powi(53)
-    };
-    let names = content.columns.iter().zip(content.statistics).filter(is_rounded);
-    let names: Vec<_> = names.map(|(column, _)| column.name.clone()).collect();
-    html! {
-        @if !names.is_empty() {
-            p.outcome.warned {
-                "Integers beyond 2" sup { "53" } " = 9007199254740992 are rounded, and differences below the rounding are not seen: "
-                (listed(&names, LISTED)) "."
             }
         }
     }
