@@ -682,6 +682,10 @@ def test_a_range_above_the_largest_number_is_drawn_and_a_long_name_fits_a_narrow
         # The axis ends at half of the largest number: the straight line is inside for this part of the time.
         assert (np.array(inked(page, "0072b2")) > 0).sum() == pytest.approx(width * 1.797 / 3.4, rel=0.03)
         assert "5e+307" in page.evaluate("Array.from(texts.values()).flat().map(([text]) => text)")
+        # A4 has 180 mm between its margins.
+        page.call("Emulation.setDeviceMetricsOverride", width=680, height=900, deviceScaleFactor=1, mobile=False)
+        page.call("Emulation.setEmulatedMedia", media="print")
+        assert page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0
 
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
