@@ -30,6 +30,19 @@ runs = {runs}
 
 [measures]
 friction = "rms(plant.f_fric)"
+gate = {{ python = "gate.py:measure" }}
+"""
+# Only the first runs end before there is a file `go`, so that the campaign is not done before it is paused.
+GATE = """
+import pathlib, time
+
+def measure(results, values):
+    folder = pathlib.Path({folder!r})
+    with open(folder / "calls", "a") as calls:
+        calls.write(".")
+    while (folder / "calls").stat().st_size > 4 and not (folder / "go").exists():
+        time.sleep(0.01)
+    return 0.0
 """
 LIMIT = 60  # s
 
@@ -53,6 +66,14 @@ class Page:
         while not holds(state := self.ask("state?show=0")):
             assert time.monotonic() < end, state
             time.sleep(0.02)
+        return state
+
+    def rest(self):
+        """The state when no run ends any more."""
+        before, state = None, self.ask("state?show=0")
+        while state["time"] != before:
+            time.sleep(1)
+            before, state = state["time"], self.ask("state?show=0")
         return state
 
     def end(self):
@@ -93,6 +114,7 @@ def campaign(tmp_path):
     def write(runs, stop):
         path = tmp_path / "small.toml"
         path.write_text(CAMPAIGN.format(runs=runs, stop=stop), encoding="utf-8")
+        (tmp_path / "gate.py").write_text(GATE.format(folder=str(tmp_path)), encoding="utf-8")
         return path
 
     return write
@@ -110,11 +132,9 @@ def test_a_campaign_that_is_watched_paused_and_stopped_goes_on_to_the_same_rows(
         assert page.ask("pause", post=True)["answer"] == "No further run starts."
         with pytest.raises(urllib.error.HTTPError, match="422"):
             page.ask("step", post=True)
-        time.sleep(1)
-        held = page.ask("state?show=0")
+        (tmp_path / "go").touch()
+        held = page.rest()
         assert held["phase"] == "paused" and 0 < held["time"] < 24
-        time.sleep(0.5)
-        assert page.ask("state")["time"] == held["time"]
         assert held["counts"] == {"ok": held["time"]} and held["messages"][0]["text"].startswith("run 0: ok, friction = ")
         assert len(held["values"][0]) == held["time"]
         assert page.ask("stop", post=True)["answer"].startswith("The campaign is stopped")

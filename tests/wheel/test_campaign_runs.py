@@ -4,6 +4,7 @@ import contextlib
 import json
 import logging
 import os
+import random
 import re
 import shutil
 import signal
@@ -120,10 +121,12 @@ def test_rows_are_those_of_single_runs_bit_for_bit_for_any_number_of_workers(
 
 
 def free_port():
-    """A port that is free now."""
+    """A port that is free now, and below those that the system gives to others."""
     with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
+        while True:
+            with contextlib.suppress(OSError):
+                listener.bind(("127.0.0.1", random.randrange(20_000, 32_000)))
+                return listener.getsockname()[1]
 
 
 class Cluster:
@@ -432,12 +435,12 @@ def test_a_run_is_repeated_by_the_command_run(campaign, tmp_path):
 
 FAILING = """
 system = "paper"
-time-limit = 1.0
+time-limit = 2.0
 runs-per-task = 3
 [experiment]
 stop-time = 0.02
 [parameters]
-"plant.F_c" = [20.0, 25.0, -1.0, 30.0]
+"plant.F_c" = [20.0, -1.0, 30.0]
 "algorithm.step" = [0.001, 1e-8]
 [measures]
 peak = "max(abs(plant.x_p))"
@@ -452,19 +455,10 @@ def test_runs_that_fail_or_last_too_long_have_their_reason_and_the_others_go_on(
     status, out, messages = done(campaign(text=FAILING), "--out", folder, "--workers", 2)
     assert status == 0, messages
     table = af.campaign.load(folder).table
-    assert list(table["status"]) == [
-        "ok",
-        "time limit",
-        "ok",
-        "time limit",
-        "failed",
-        "failed",
-        "ok",
-        "time limit",
-    ]
-    assert "F_c" in table["reason"][4]
-    assert np.isnan(table["peak"][4])
-    assert "5 of 8 runs did not finish" in out
+    assert list(table["status"]) == ["ok", "time limit", "failed", "failed", "ok", "time limit"]
+    assert "F_c" in table["reason"][2]
+    assert np.isnan(table["peak"][2])
+    assert "4 of 6 runs did not finish" in out
     signals = parquet.read_table(folder / "signals" / "run-000000000.parquet")
     assert signals.column_names == ["time", "plant.x_p"]
     assert np.max(np.abs(signals["plant.x_p"].to_numpy())) == table["peak"][0]

@@ -126,9 +126,14 @@ def test_an_interrupted_run_leaves_its_rows(paper):
     import _thread
     import threading
 
-    threading.Timer(0.3, _thread.interrupt_main).start()
+    timer = threading.Timer(0.2, _thread.interrupt_main)
+
+    def started(fraction):
+        if timer.ident is None:
+            timer.start()
+
     with pytest.raises(KeyboardInterrupt) as caught:
-        paper.run(stop_time=1e5, record_every=0.01)
+        paper.run(stop_time=1e5, record_every=0.01, progress=started)
     results = vars(caught.value)["results"]
     assert results.end == "interrupted" and 10 < len(results.time) and results.end_time < 1e5
     again = paper.run(stop_time=results.time[-1] + 1e-6, record_every=0.01)
