@@ -19,6 +19,8 @@ import sys
 import urllib.request
 import venv
 from collections import Counter
+from contextlib import ExitStack
+from fcntl import LOCK_SH, flock
 from functools import cache
 from pathlib import Path
 
@@ -71,6 +73,14 @@ def files():
     return [path for path in listed.split("\0") if path and (ROOT / path).is_file()]
 
 
+def copy(target, folder):
+    """Copies a folder of cargo, while no other test packs a model into it."""
+    with ExitStack() as stack:
+        for path in target.glob("*/.cargo*lock"):
+            flock(stack.enter_context(path.open(encoding="ascii")), LOCK_SH)
+        subprocess.run(["cp", "--archive", target, folder], check=True)
+
+
 class Reader:
     """Somebody who types the commands of the pages into a shell."""
 
@@ -82,7 +92,7 @@ class Reader:
         if built := os.environ.get("BUILT_PROGRAMS"):
             (self.folder / "target").mkdir()
             for name in ("release", "libraries"):
-                subprocess.run(["cp", "--archive", Path(built).parent / name, self.folder / "target"], check=True)
+                copy(Path(built).parent / name, self.folder / "target")
         venv.create(home / "python", with_pip=True)
         ours = str(Path(sys.prefix) / "bin")
         path = [part for part in os.environ["PATH"].split(os.pathsep) if part != ours]

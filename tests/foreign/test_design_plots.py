@@ -185,7 +185,7 @@ def test_one_finger_on_a_plot_scrolls_the_page_and_does_not_zoom(opened):
     mouse(opened, "mouseMoved", place(opened, "step-1-1", 0.999))
     before, right = opened.evaluate("scrollY"), legend(opened, "step-1-1")[0]
     opened.swipe_up("#step-1-1 .u-over", 200)
-    opened.until(f"scrollY > {before} + 100", limit=10)
+    opened.until(f"scrollY > {before} + 100")
     mouse(opened, "mouseMoved", place(opened, "step-1-1", 0.999))
     assert legend(opened, "step-1-1")[0] == right
 

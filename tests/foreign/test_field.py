@@ -3,8 +3,11 @@
 import json
 import stat
 import zipfile
+from types import SimpleNamespace
 
 import pytest
+
+from field_compare import Judge, Trial
 
 
 @pytest.fixture(scope="session")
@@ -78,17 +81,22 @@ NO_SETTING = 'kept=(); while [ $# -gt 0 ]; do if [ "$1" = --set ]; then shift 2;
         (NO_SETTING, "", {"set": "lost"}),
         ('[ "$1" = run ] && exit 2', "", {"defaults": "lost", "values": "lost", "set": "lost"}),
         ('[ "$1" = check ] && kill -SEGV $$', "", {"check": "failed"}),
-        ('[ "$1" = check ] && sleep 1000', "", {"check": "failed"}),
     ],
 )
 def test_a_fault_of_the_command_is_reported_as_a_failure(field, fmus, faulty, before, after, expected):
-    limit = ("--time-limit", "5") if "sleep" in before else ()
-    status, said, verdicts = field(fmus, "--command", faulty(before, after), *limit)
+    status, said, verdicts = field(fmus, "--command", faulty(before, after))
     assert status == 1, said
     answers = words(verdicts["Copy.fmu"])
     assert {question: answers[question] for question in expected} == expected, verdicts
     short = [line for line in said.splitlines() if "Copy.fmu: " in line]
     assert {line.split(":")[0] for line in short} == set(expected), said
+
+
+def test_a_command_that_does_not_end_is_a_failure(faulty, tmp_path):
+    judge = Judge(SimpleNamespace(command=faulty("sleep 1000"), time_limit=0.1, steps=1), None, tmp_path)
+    trial = Trial(judge, SimpleNamespace(path="Any.fmu", start=0.0, stop=1.0, step=1.0), tmp_path)
+    answer = trial.check()
+    assert answer["verdict"] == "failed" and "no end within the time limit" in answer["detail"]
 
 
 def test_an_explained_difference_is_no_failure(field, fmus, faulty, tmp_path):

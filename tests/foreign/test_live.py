@@ -247,15 +247,18 @@ def test_a_checkpoint_of_a_stopped_run_has_its_interventions(aso_ftc, tmp_path):
 
 
 def test_a_pause_is_no_lateness_of_a_paced_run(tmp_path):
-    with live(tmp_path, "--stop-time", 0.3, "--step", 0.01, "--real-time=1") as run:
-        time.sleep(0.5)
+    with live(tmp_path, "--stop-time", 1000, "--step", 0.01, "--real-time=1") as run:
+        time.sleep(0.2)
         run.do("continue")
         run.do("pause")
-        time.sleep(0.5)
+        time.sleep(2)
         run.do("continue")
+        before = run.state()["time"]
+        run.until(lambda state: state["time"] > before)
+        run.do("stop")
         out = run.end()
     lateness = re.search(r"at most by (\S+) s", out)
-    assert "of it paused by the live view" in out and (not lateness or float(lateness[1]) < 0.4), out
+    assert "of it paused by the live view" in out and (not lateness or float(lateness[1]) < 1.9), out
 
 
 def test_ctrl_c_ends_a_paused_run(tmp_path):
@@ -566,7 +569,8 @@ def two_fingers_zoom_until_a_double_tap(page):
 
 @pytest.mark.skipif(not CHROMIUM, reason="no Chromium is installed")
 def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
-    with live(tmp_path / "run", "--stop-time", 60, "--real-time=2", "--record-every", "step") as run, browser(tmp_path / "profile") as page:
+    options = ["--stop-time", 600, "--real-time=2", "--record-every", "step"]
+    with live(tmp_path / "run", *options) as run, browser(tmp_path / "profile") as page:
         page.open(run.url)
         page.until("document.body.dataset.ready === 'true' && document.body.dataset.phase === 'paused'")
         text = "document.getElementById('{}').textContent"
@@ -609,6 +613,7 @@ def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
         two_fingers_zoom_until_a_double_tap(page)
         page.evaluate(click.format("hold"))
         page.until("document.body.dataset.phase === 'paused'")
+        reached = page.evaluate("Number(document.body.dataset.time)")
         assert page.violations() == []
         page.evaluate(click.format("stop"))
         page.evaluate(click.format("stop"))
@@ -618,9 +623,10 @@ def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
         assert complaints == []
         assert all(request.startswith((run.url, "data:", "blob:")) for request in page.requests)
         run.end()
-    done = aso_ftc("run", tmp_path / "run" / "live.toml")
-    assert done.returncode == 0, done.stderr
-    results, again = ((tmp_path / "run" / f"{name}.csv").read_bytes() for name in ("results", "repeat"))
+    changes = tmp_path / "run" / "live.toml"
+    text = changes.read_text(encoding="utf-8")
+    changes.write_text(text.replace("stop-time = 600.0", f"stop-time = {reached + 1}"), encoding="utf-8")
+    results, again = repeated(tmp_path / "run", aso_ftc)
     assert again.startswith(results) and results.count(b"\n") > 500
 
 
@@ -630,7 +636,7 @@ def test_the_page_shows_times_in_seconds_since_1970_with_all_digits(tmp_path):
         page.open(run.url)
         page.until("document.body.dataset.ready === 'true' && document.body.dataset.phase === 'paused'")
         page.evaluate("document.getElementById('step').click()")
-        page.until("document.getElementById('time').textContent === '1700000000.001 of 1700000060 s'", limit=10)
+        page.until("document.getElementById('time').textContent === '1700000000.001 of 1700000060 s'")
 
 
 class Tunnel:

@@ -62,7 +62,7 @@ def test_a_wait_ends_with_ctrl_c(tmp_path):
     assert "->" in process.stdout.readline()
     time.sleep(0.3)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=5)
+    _, said = process.communicate(timeout=60)
     assert process.returncode == 130 and "the run was interrupted" in said
     assert len((tmp_path / "results.csv").read_text(encoding="utf-8").splitlines()) > 1
 

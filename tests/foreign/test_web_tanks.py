@@ -158,9 +158,9 @@ def test_it_plays_at_once_and_every_control_answers(tmp_path):
     with opening(tmp_path, motion="no-preference", name="tanks.html") as opened:
         page = opened("#leak=99&nonsense=1&blocked=many")
         assert page.evaluate("document.getElementById('value-leak').textContent") == "20 mL/s"
-        page.until("Number(document.getElementById('time').value) > 20", limit=20)
+        page.until("Number(document.getElementById('time').value) > 20")
         page.evaluate("document.getElementById('speed').value = '200'")
-        page.until("Number(document.getElementById('time').value) === 1000", limit=30)
+        page.until("Number(document.getElementById('time').value) === 1000")
         page.until("document.getElementById('play').textContent === 'Run'")
         page.evaluate("document.getElementById('play').click()")
         assert page.evaluate("document.getElementById('play').textContent") == "Pause"
