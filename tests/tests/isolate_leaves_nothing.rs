@@ -63,7 +63,7 @@ fn after_drop_no_process_no_shared_memory_and_no_file_is_left() {
     let before = belongings();
     assert_eq!(before.1, 0);
     let limit = Some(Duration::from_millis(100));
-    for _ in 0..5 {
+    for _ in 0..3 {
         let mut well = open(None);
         step(&mut well, Trouble::None).unwrap();
         let second = open(None);
@@ -73,7 +73,8 @@ fn after_drop_no_process_no_shared_memory_and_no_file_is_left() {
         for trouble in [Trouble::CrashInStep, Trouble::Leave, Trouble::Hang] {
             step(&mut open(limit), trouble).unwrap_err();
         }
-        step(&mut open(limit), Trouble::HangInFree).unwrap();
+        // The step itself is shorter than this limit, on a busy machine, too.
+        step(&mut open(Some(Duration::from_secs(1))), Trouble::HangInFree).unwrap();
     }
     assert_eq!(belongings(), before);
 }
