@@ -1,16 +1,22 @@
 """Each phase of `aso-ftc design` has a budget, says where it is, and ends at Ctrl-C."""
 
+import resource
 import signal
 import subprocess
-import time
 
 import large_plants
 from conftest import ROOT
 
 COMMAND = ROOT / "target" / "release" / "aso-ftc"
-# The machine may be loaded; a program of this size takes minutes for each iteration.
+# A program of this size takes minutes for each iteration.
 PATIENCE = 60
 LEAST = 'h_infinity = "least"\n{0}.region = {{ decay = 0.05, disc = {{ center = -5, radius = 4.95 }} }}\n'
+
+
+def processor_time():
+    """The seconds of all commands that have ended: other programs on the machine do not count."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def chain(folder, states):
@@ -23,9 +29,9 @@ def chain(folder, states):
 
 
 def test_gains_that_are_not_found_in_time_are_refused(aso_ftc, tmp_path):
-    start = time.monotonic()
+    start = processor_time()
     done = aso_ftc("design", chain(tmp_path, 40), "--gain-time", "2", "--out", tmp_path / "design.toml")
-    assert time.monotonic() - start < PATIENCE
+    assert processor_time() - start < PATIENCE
     assert done.returncode == 2, done
     assert "left out after 2 s, the time for the search for gains; --gain-time allows more" in done.stderr
     assert not (tmp_path / "design.toml").exists()
@@ -46,10 +52,10 @@ def test_a_search_says_where_it_is_every_ten_seconds_and_ends_at_an_interrupt(tm
 def test_certificates_keep_their_time_and_the_design_is_written(aso_ftc, tmp_path):
     file = tmp_path / "chain.toml"
     file.write_text(large_plants.plant_file(28), encoding="utf-8")
-    start = time.monotonic()
+    start = processor_time()
     aso_ftc("design", file, "--certificate-time", "0", "--out", tmp_path / "design.toml")
-    without = time.monotonic() - start
+    without = processor_time() - start
     done = aso_ftc("design", file, "--certificate-time", "1", "--out", tmp_path / "design.toml", "--json", "--force")
     assert done.returncode in (0, 1), done.stderr
-    assert time.monotonic() - start < 2 * without + 0.5 * PATIENCE
+    assert processor_time() - start < 2 * without + 0.5 * PATIENCE
     assert "left out after 1 s, the time for certificates and bounds" in done.stdout

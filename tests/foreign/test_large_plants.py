@@ -1,6 +1,7 @@
 """A lightly damped chain of 25 masses, 50 states: the numbers of `aso-ftc design --json` by scipy."""
 
 import json
+import re
 import tomllib
 
 import numpy as np
@@ -29,7 +30,8 @@ def designed(aso_ftc, tmp_path_factory):
     options = ("--certificate-time", "0", "--out", folder / "design.toml", "--json")
     done = aso_ftc("design", folder / "chain.toml", *options)
     assert done.returncode in (0, 1), done.stderr
-    assert done.stderr == ""
+    # On a slow machine the command says where it is.
+    assert re.sub(r"\d+ s, \d+ %: .*\n", "", done.stderr) == ""
     design = tomllib.loads((folder / "design.toml").read_text(encoding="utf-8"))
     return json.loads(done.stdout), Matrices(design)
 
