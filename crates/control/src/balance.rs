@@ -200,6 +200,21 @@ pub(crate) fn divide_columns(m: &DMatrix<f64>, d: &DVector<f64>) -> DMatrix<f64>
     DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / d[j])
 }
 
+/// S^-1 M S, with the diagonal S of `scale`.
+pub(crate) fn similar(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    divide_rows(&multiply_columns(m, scale), scale)
+}
+
+/// S M S, with the diagonal S of `scale`.
+pub(crate) fn multiplied(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    multiply_rows(&multiply_columns(m, scale), scale)
+}
+
+/// S^-1 M S^-1, with the diagonal S of `scale`.
+pub(crate) fn divided(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    divide_rows(&divide_columns(m, scale), scale)
+}
+
 /// The norms of the columns; 1 for a zero column.
 pub(crate) fn column_lengths(m: &DMatrix<f64>) -> DVector<f64> {
     let norms = DVector::from_iterator(m.ncols(), m.column_iter().map(|column| column.norm()));

@@ -3,7 +3,7 @@
 //! One scalar weight is free; a larger weight gives a slower loop. The weight is chosen so that the loop gain crosses
 //! one at the bandwidth. All other weights are relative to the units of inputs and outputs, see [`NaturalUnits`].
 
-use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns};
+use crate::balance::{Balance, divided, multiply_columns};
 use crate::blocks::to_complex;
 use crate::lyapunov::{CONTINUOUS, DISCRETE};
 use crate::response::{FrequencyPoint, frequency_response};
@@ -90,7 +90,7 @@ fn energies(system: &StateSpace, rate: f64) -> Result<DMatrix<f64>, Error> {
     let rows = multiply_columns(c, &scale);
     for (at, input) in b.column_iter().enumerate() {
         let gramian = equation.solve(&damped.transpose(), &(input * input.transpose()))?;
-        let size = divide_rows(&divide_columns(&gramian, &scale), &scale).amax();
+        let size = divided(&gramian, &scale).amax();
         for (row, output) in c.row_iter().enumerate() {
             h[(row, at)] = (output * &gramian * output.transpose())[(0, 0)].max(0.0);
             sizes[(row, at)] = rows.row(row).norm_squared() * size;

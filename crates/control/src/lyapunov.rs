@@ -3,7 +3,7 @@
 mod doubling;
 mod triangular;
 
-use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns, multiply_rows};
+use crate::balance::{Balance, divide_columns, divide_rows, multiplied};
 use crate::blocks::symmetric_part;
 use crate::svd::Svd;
 use crate::{Domain, Error, check, stability};
@@ -177,7 +177,7 @@ impl Equation {
     /// [`Error::NotConverged`] when the Schur form is not found, [`Error::Overflow`].
     pub(crate) fn solve(&self, a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let Balance { matrix, scale } = Balance::new(a);
-        let scaled_q = multiply_rows(&multiply_columns(q, &scale), &scale);
+        let scaled_q = multiplied(q, &scale);
         let by_doubling = || solve_by_doubling(&matrix, &scaled_q, self.domain, self.remainder);
         let by_schur_form = || self.by_schur_form(&matrix, &scaled_q);
         let residual = |p: &DMatrix<f64>| self.residual(&matrix, p, &scaled_q);

@@ -14,7 +14,7 @@ mod update_order;
 
 pub use alternatives::{Alternatives, alternatives, alternatives_balanced, alternatives_discrete};
 
-use crate::balance::{Balance, column_lengths, divide_columns, divide_rows, multiply_columns};
+use crate::balance::{Balance, column_lengths, divide_columns, divide_rows, similar};
 use crate::rank::require_controllable;
 use crate::svd::Svd;
 use crate::{Error, check};
@@ -322,7 +322,7 @@ struct Assignable {
 
 impl Assignable {
     fn new(problem: &PlacementProblem<'_>, units: &DVector<f64>) -> Result<Self, Error> {
-        let a = divide_rows(&multiply_columns(problem.a, units), units);
+        let a = similar(problem.a, units);
         let b = divide_rows(problem.b, units);
         let basis = input_basis(&b)?;
         let b = &b * &basis;

@@ -3,7 +3,7 @@
 use super::pole_block::PoleBlock;
 use super::subspace::{AssignableSubspaces, basis, equations};
 use crate::Error;
-use crate::balance::{divide_columns, divide_rows, multiply_columns, multiply_rows};
+use crate::balance::{divide_columns, divide_rows, multiply_columns, multiply_rows, similar};
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
@@ -25,7 +25,7 @@ pub(crate) fn gain(
     directions: &[DVector<f64>],
 ) -> Result<DMatrix<f64>, Error> {
     let (scale, response_scale) = (&problem.scale, &problem.response_scale);
-    let a = divide_rows(&multiply_columns(a, scale), scale);
+    let a = similar(a, scale);
     let b = divide_rows(&multiply_columns(b, response_scale), scale);
     let vectors = problem.scaled_eigenvectors(directions);
     let responses = problem.scaled_responses(directions);

@@ -3,7 +3,7 @@
 use super::pole_block::{PoleBlock, distance};
 use super::{EXACT, PlacementProblem};
 use crate::Error;
-use crate::balance::{divide_rows, multiply_columns};
+use crate::balance::{divide_rows, multiply_columns, similar};
 use crate::blocks::{beside, block_diagonal, stacked};
 use crate::check::as_number;
 use crate::eigen::eigenvalues;
@@ -66,7 +66,7 @@ impl PlacementProblem<'_> {
         blocks: impl Iterator<Item = PoleBlock>,
     ) -> Option<DMatrix<f64>> {
         let m = block_diagonal(&blocks.map(PoleBlock::block).collect::<Vec<_>>());
-        let a = divide_rows(&multiply_columns(self.a, units), units);
+        let a = similar(self.a, units);
         let b = divide_rows(self.b, units);
         let response = AccurateProduct::new(&multiply_columns(gain, units), v);
         let factors = beside(&beside(&a, &b), &beside(&b, &-v));

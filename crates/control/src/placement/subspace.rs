@@ -4,6 +4,7 @@ use super::pole_block::PoleBlock;
 use crate::Error;
 use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two_or_one,
+    similar,
 };
 use crate::blocks::beside;
 use crate::check::as_number;
@@ -153,7 +154,7 @@ fn in_units(
 ) -> Vec<DMatrix<f64>> {
     let (n, r) = b.shape();
     let (of_states, of_responses) = (units.rows(0, n).into(), units.rows(n, r).into());
-    let a = divide_rows(&multiply_columns(a, &of_states), &of_states);
+    let a = similar(a, &of_states);
     let b = divide_rows(&multiply_columns(b, &of_responses), &of_states);
     blocks.iter().map(|&poles| equations(&a, &b, poles)).collect()
 }

@@ -1,7 +1,8 @@
 //! The filter whose error has an H-infinity norm below a bound.
 
-use super::problem::{balancing, divided, multiplied, similar};
+use super::problem::balancing;
 use super::{KalmanFilter, doubling, kalman};
+use crate::balance::{divided, multiplied, similar};
 use crate::blocks::symmetric_part;
 use crate::{Domain, Error, check, stability};
 use nalgebra::DMatrix;

@@ -5,7 +5,7 @@ use super::doubling;
 use super::equation::RiccatiEquation;
 use super::semidefinite::require_semidefinite;
 use crate::balance::{
-    Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
+    Balance, divide_columns, divide_rows, divided, multiplied, multiply_rows, power_of_two, similar,
 };
 use crate::blocks::{block_2x2, symmetric_part};
 use crate::lyapunov;
@@ -145,19 +145,4 @@ pub(super) fn balancing(a: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) ->
     let hamiltonian = block_2x2([&dynamics, &g.abs()], [&q.abs(), &dynamics.transpose()]);
     let scale = Balance::new(&hamiltonian).scale;
     DVector::from_fn(order, |i, _| power_of_two((scale[i] / scale[order + i]).sqrt()))
-}
-
-/// S^-1 M S, with the diagonal S of `scale`.
-pub(super) fn similar(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
-    divide_rows(&multiply_columns(m, scale), scale)
-}
-
-/// S M S, with the diagonal S of `scale`.
-pub(super) fn multiplied(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
-    multiply_rows(&multiply_columns(m, scale), scale)
-}
-
-/// S^-1 M S^-1, with the diagonal S of `scale`.
-pub(super) fn divided(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
-    divide_rows(&divide_columns(m, scale), scale)
 }
