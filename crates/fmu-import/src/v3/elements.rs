@@ -2,7 +2,7 @@
 //!
 //! A master knows scalars only. [`ElementView`] replaces each array by its elements: names `A[1,2]` in
 //! row-major order with indices from 1, and value references that no variable of the FMU has. Scalars keep
-//! their value references.
+//! their value references. An array whose elements the FMU lists as scalars, too, is left out.
 
 use std::collections::{HashMap, HashSet};
 
@@ -103,7 +103,14 @@ impl ElementView {
             ));
         }
         builder.view.base = free_references(description, total);
+        let scalars =
+            description.variables.iter().filter(|variable| variable.dimensions.is_empty());
+        let scalars: HashSet<&str> = scalars.map(|variable| variable.name.as_str()).collect();
         for (variable, extents) in description.variables.iter().zip(&extents) {
+            if elements_are_scalars(variable, extents, &scalars) {
+                builder.ranges.push((builder.view.description.variables.len(), 0));
+                continue;
+            }
             let resized = variable.dimensions.iter().any(
                 |dimension| matches!(dimension, Dimension::Variable(by) if sizes.contains_key(by)),
             );
@@ -155,6 +162,20 @@ fn extents(
 fn count(extents: &[u64]) -> usize {
     let product = extents.iter().fold(1_u64, |product, extent| product.saturating_mul(*extent));
     usize::try_from(product).unwrap_or(usize::MAX)
+}
+
+/// Returns whether each element of an array is listed as a scalar, too, as in FMU containers; `scalars` are the names of all
+/// scalars.
+fn elements_are_scalars(
+    variable: &ScalarVariable,
+    extents: &[u64],
+    scalars: &HashSet<&str>,
+) -> bool {
+    let name = |element| format!("{}{}", variable.name, indices(element, extents));
+    let mut elements = 0..count(extents);
+    !extents.is_empty()
+        && !elements.is_empty()
+        && elements.all(|element| scalars.contains(name(element).as_str()))
 }
 
 /// Returns the first of `count` consecutive value references that no variable has.
@@ -464,6 +485,23 @@ mod tests {
                 "{reason}"
             );
         }
+    }
+
+    #[test]
+    fn an_array_whose_elements_are_scalars_is_left_out() {
+        let of_view = |scalars: &str| {
+            let text =
+                DESCRIPTION.replace("</ModelVariables>", &format!("{scalars}</ModelVariables>"));
+            let (description, _) = ModelDescription::read(text).unwrap();
+            ElementView::new(&description, &HashMap::new()).map(|view| view.description)
+        };
+        let first = r#"<Float64 name="v[1]" valueReference="11"/>"#;
+        let both =
+            of_view(&format!(r#"{first}<Float64 name="v[2]" valueReference="12"/>"#)).unwrap();
+        assert_eq!(both.variables.len(), 6);
+        assert_eq!(both.variable("v[2]").unwrap().value_reference, 12);
+        let reason = of_view(first).unwrap_err();
+        assert_eq!(reason, "the element v[1] has the name of another variable");
     }
 
     #[test]
