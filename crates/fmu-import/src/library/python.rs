@@ -44,7 +44,8 @@ pub(super) fn provide(fmu: &str) -> Result<(), String> {
             Ok(()) => {
                 tracing::warn!(
                     target: "fmu", instance = fmu,
-                    "its library expects Python in the process: {} is loaded; --preload selects another",
+                    "its library expects Python in the process: {} is loaded; --preload selects another, \
+                     PYTHONPATH adds folders of packages",
                     library.display()
                 );
                 return Ok(());
