@@ -56,6 +56,12 @@ pub(crate) fn set(
         error.set_cause(py, Some(cause));
         error
     })?;
+    if let Value::String(text) = &converted
+        && let Err(expected) = Value::parse(&system.variable(port).kind, &[], text)
+    {
+        let (name, value) = (system.name(port), text.clone());
+        return Err(error::system(&SystemError::Value { name, value, expected }).raise(py));
+    }
     system.set_value(port, &converted).map_err(|source| failed(py, system, port, time, source))
 }
 

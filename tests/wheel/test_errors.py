@@ -85,6 +85,12 @@ def test_terminals_that_do_not_match_are_a_configuration_error(packed):
     assert (error.kind, error.name, error.source) == ("Terminals", "plant.x_p", "node.CanChannel")
 
 
+def test_a_text_with_a_nul_character_is_refused(packed):
+    system = af.System().add("node", packed("examples/can-node"))
+    with pytest.raises(af.ConfigurationError, match="^node.node = .*: expected a text without the character NUL"):
+        system.check(start_values={"node.node": "one\0two"})
+
+
 def test_results_in_a_file_that_the_run_reads_are_a_configuration_error(paper, tmp_path):
     file = tmp_path / "signal.csv"
     file.write_text("time,plant.d\n0,0\n", encoding="utf-8")

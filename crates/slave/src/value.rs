@@ -42,6 +42,9 @@ impl Value {
                 "false" | "0" => Ok(Value::Boolean(false)),
                 _ => Err("true or false".to_owned()),
             },
+            Kind::String(_) if text.contains('\0') => {
+                Err("a text without the character NUL, which ends the Strings of FMI".to_owned())
+            }
             Kind::String(_) => Ok(Value::String(text.to_owned())),
             Kind::Binary(_) => from_hex(trimmed)
                 .map(Value::Binary)
@@ -194,6 +197,13 @@ mod tests {
         let kind = Kind::Enumeration(IntegerType::default());
         assert_eq!(Value::parse(&kind, &[], "7"), Ok(Value::Integer(7)));
         assert_eq!(Value::parse(&kind, &[], "on"), Err("an integer".to_owned()));
+    }
+
+    #[test]
+    fn a_string_has_no_nul_which_would_end_it_in_the_fmu() {
+        let kind = Kind::String(None);
+        assert_eq!(Value::parse(&kind, &[], " a "), Ok(Value::String(" a ".to_owned())));
+        assert!(Value::parse(&kind, &[], "a\0b").is_err());
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::{Csv, Ramp, Reason, ScenarioError, SetEntry, SignalEntry, Sine, Table
 use crate::table::Table;
 use master::drive::DriveSource;
 use master::signal::{Interpolation, Signal, Track};
-use master::{Port, SystemError};
+use master::{Port, SystemError, Value};
 
 /// Kinds of a signal.
 const KINDS: &str = "constant, steps, points, ramp, sine, csv";
@@ -185,6 +185,8 @@ fn encode(
         let Literal::Text(text) = value else {
             return Err(target.value_error(value, "a text in quotes"));
         };
+        let parsed = Value::parse(&target.variable.kind, &[], text);
+        parsed.map_err(|expected| target.value_error(value, expected))?;
         texts.push(text.clone());
         return Ok((texts.len() - 1) as f64);
     }

@@ -61,6 +61,11 @@ fn values_that_do_not_fit_the_type_are_refused() {
         ),
         ("on", "1", "1: expected true or false"),
         ("mode", "1", "1: expected a text in quotes"),
+        (
+            "mode",
+            "\"a\\u0000b\"",
+            "\"a\\0b\": expected a text without the character NUL, which ends the Strings of FMI",
+        ),
     ] {
         let text = set(&format!("variable = \"plant.{name}\", at = 1, value = {value}"));
         expect(&text, &format!("scenario.set[1]: plant.{name} = {expected}"));
