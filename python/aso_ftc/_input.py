@@ -216,6 +216,8 @@ def _present(variable: Variable, times: NDArray[Any], column: Any) -> tuple[NDAr
     if variable.type == "String":
         return times, values
     try:
+        if numpy.iscomplexobj(values):
+            raise TypeError("expected real numbers, found complex ones")
         numbers = values.astype(float)
     except (TypeError, ValueError) as error:
         sentence = f"input: {name} is a {variable.type}: {error}"

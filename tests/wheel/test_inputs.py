@@ -107,6 +107,7 @@ def test_units_of_a_table_are_converted(first):
         ({"time": ["a"], "u": [1.0]}, "time is no number"),
         ({"time": [], "u": []}, "at least one row"),
         ({"time": [0.0], "u": ["strong"]}, "u is a Real: could not convert"),
+        ({"time": [0.0], "u": [1.0 + 2.0j]}, "u is a Real: expected real numbers, found complex ones"),
         ({"time": [0.0, 1.0], "u": [[1.0, 2.0], [1.0, 2.0]]}, "u is a scalar"),
         (3.0, "found float"),
     ],
