@@ -219,8 +219,10 @@ class Built:
         self.name, self.header = header.stem, header.read_text(encoding="utf-8")
 
     def compiled(self, *options, compiler="gcc"):
-        """The C code with `controller_loop.c`, as a program."""
-        program = self.folder / ("c" + "".join(options).replace("=", "").replace(",", ""))
+        """The C code with `controller_loop.c`, as a program, which is compiled once."""
+        program = self.folder / (compiler + "".join(options).replace("=", "").replace(",", ""))
+        if program.exists():
+            return program
         source, header = (self.folder / "c" / f"{self.name}.{end}" for end in "ch")
         unit = program.with_suffix(".o")
         run(compiler, *WARNINGS, *options, "-c", source, "-o", unit)
@@ -230,8 +232,10 @@ class Built:
         return program
 
     def crate(self):
-        """The Rust crate with `controller_loop.rs`, as a program."""
+        """The Rust crate with `controller_loop.rs`, as a program, which is compiled once."""
         library, program = self.folder / "libcontroller.rlib", self.folder / "rust-loop"
+        if program.exists():
+            return program
         always = ["rustc", "--edition", "2021", "-O", "-D", "warnings"]
         source = self.folder / "rust" / "src" / "lib.rs"
         run(*always, "--crate-type", "rlib", "--crate-name", "controller", source, "-o", library)

@@ -476,13 +476,13 @@ def test_a_step_at_the_end_claims_no_step(open_page):
     page.until(f"{STATUS} === 'One step of 10 communication points.'")
 
 
-def test_a_run_of_5001_s_has_its_summary(open_page):
-    page = open_page("#t_on=5000&stop=5001")
+def test_a_run_of_2501_s_has_its_summary(open_page):
+    page = open_page("#t_on=2500&stop=2501")
     page.evaluate("document.getElementById('speed').value = 'Infinity'; document.getElementById('play').click()")
     page.until("document.body.dataset.spent !== undefined", limit=400)
     page.until("document.querySelector('#claims').textContent.includes('0.1')")
-    assert page.evaluate("window.paper.rows[0].length") == 500_101
-    x = np.array(page.evaluate("[...window.paper.rows[1]].slice(125000, 500001)"))
+    assert page.evaluate("window.paper.rows[0].length") == 250_101
+    x = np.array(page.evaluate("[...window.paper.rows[1]].slice(62500, 250001)"))
     assert float(claims(page)[0].split()[0]) == pytest.approx(amplitude(x), rel=1e-3)
 
 
