@@ -36,11 +36,11 @@ def changed(plant_file, folder, *changes):
 class Designed:
     """Files in `folder` and output of `aso-ftc design PLANT_FILE --fmu`."""
 
-    def __init__(self, aso_ftc, plant_file, folder):
+    def __init__(self, aso_ftc, plant_file, folder, options=()):
         self.folder, self.fmu = Path(folder), Path(folder) / "Designed.fmu"
         file = self.folder / "design.toml"
         outputs = ("--out", file, "--report", self.folder / "report.html", "--fmu", self.fmu, "--json")
-        done = aso_ftc("design", ROOT / plant_file, *outputs)
+        done = aso_ftc("design", ROOT / plant_file, *outputs, *options)
         assert done.returncode in (0, 1), done.stderr
         self.report = json.loads(done.stdout)
         assert done.returncode == (self.report["verdict"]["level"] == "red")

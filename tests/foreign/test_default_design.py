@@ -8,7 +8,7 @@ import pytest
 from scipy.io import savemat
 from scipy.sparse import csc_array
 
-from design_oracle import COLUMN, design_and_report
+from design_oracle import COLUMN, WITHOUT_PROOFS, design_and_report
 
 # Published plants: the source, A, B, C, and the number of actuators whose faults the measurements can tell apart.
 PLANTS = {
@@ -67,7 +67,7 @@ def designed(aso_ftc, tmp_path):
     def run(text, name="plant"):
         path = tmp_path / f"{name}.toml"
         path.write_text(text, encoding="utf-8")
-        done = aso_ftc("design", path, "--out", tmp_path / f"{name}-design.toml", "--json", "--force")
+        done = aso_ftc("design", path, "--out", tmp_path / f"{name}-design.toml", "--json", "--force", *WITHOUT_PROOFS)
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)
 
@@ -311,7 +311,7 @@ actuator_faults = "all"
 
 
 def test_an_estimate_that_is_much_slower_than_the_feedback_is_a_warning_whose_remedy_works(aso_ftc, tmp_path):
-    _, report = design_and_report(aso_ftc, tmp_path, AIRLINER)
+    _, report = design_and_report(aso_ftc, tmp_path, AIRLINER, ())
     slowest = -max(pole[0] for pole in report["observer"]["eigenvalues"])
     (warning,) = report["warnings"]
     time = float(warning.split("settle in ")[1].split(" s")[0])
@@ -319,7 +319,7 @@ def test_an_estimate_that_is_much_slower_than_the_feedback_is_a_warning_whose_re
     # The weak direction of the gain at rest, which the estimate of it is slow for.
     a, b, c = (np.array(tomllib.loads(AIRLINER)[name], float) for name in "ABC")
     assert np.linalg.cond(c @ np.linalg.solve(a, b)) > 1e5
-    _, report = design_and_report(aso_ftc, tmp_path, AIRLINER.replace('"all"', '["rudder"]'))
+    _, report = design_and_report(aso_ftc, tmp_path, AIRLINER.replace('"all"', '["rudder"]'), ())
     assert [fault["name"] for fault in report["plant"]["faults"]] == ["f_rudder"] and not report["warnings"]
     assert -max(pole[0] for pole in report["observer"]["eigenvalues"]) > 100 * slowest
 

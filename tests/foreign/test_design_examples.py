@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from design_loop import Designed, changed, coupled, packed_plant
+from design_oracle import WITHOUT_PROOFS
 
 # Claims of the paper, and half of them where the velocity of the cart is measured as well: m, rad.
 PENDULUMS = [("pendulum", 1e-3, 2e-3), ("pendulum-three-measurements", 0.5e-3, 1e-3)]
@@ -48,7 +49,7 @@ def must_settle(table, designed, fault, value, begin, others=()):
 def test_the_pendulum_stays_within_1_mm_and_2_mrad_after_compensation(
     name, cart, angle, aso_ftc, python, packed, tmp_path
 ):
-    designed = Designed(aso_ftc, f"fmu-controller/{name}.toml", tmp_path)
+    designed = Designed(aso_ftc, f"fmu-controller/{name}.toml", tmp_path, WITHOUT_PROOFS)
     designed.must_be_sound()
     table, summary = coupled(python, designed, packed["plant"], {})
     uncompensated = (table["time"] > 10) & (table["time"] < 40)
@@ -64,7 +65,7 @@ def test_the_pendulum_stays_within_1_mm_and_2_mrad_after_compensation(
 def test_two_simultaneous_pump_faults_are_estimated_and_compensated(
     aso_ftc, python, tanks, tmp_path
 ):
-    designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path)
+    designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path, WITHOUT_PROOFS)
     designed.must_be_sound()
     table, _ = coupled(python, designed, tanks, BOTH)
     must_settle(table, designed, "f_1", 1e-5, 300, [8e-6])
@@ -75,7 +76,7 @@ def test_two_simultaneous_pump_faults_are_estimated_and_compensated(
 
 def test_the_levels_move_as_the_report_predicts(aso_ftc, python, tanks, tmp_path):
     """The report is linear and the tanks are not: 12 % of the largest movement is allowed."""
-    designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path)
+    designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path, WITHOUT_PROOFS)
     table, _ = coupled(python, designed, tanks, BOTH)
     times = np.arange(300.0)
     for level, operating in LEVELS.items():
@@ -91,13 +92,13 @@ def test_the_levels_move_as_the_report_predicts(aso_ftc, python, tanks, tmp_path
 def test_without_compensation_the_same_faults_move_the_levels_permanently(
     aso_ftc, python, tanks, tmp_path
 ):
-    designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path)
+    designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path, WITHOUT_PROOFS)
     table, _ = coupled(python, designed, tanks, BOTH | {"controller.compensate": "false"})
     assert abs(table["plant.h_1"][-1] - LEVELS["h_1"]) > 1e-3
 
 
 def test_losses_of_effectiveness_of_both_pumps_are_estimated(aso_ftc, python, tanks, tmp_path):
-    designed = Designed(aso_ftc, "examples/three-tank/loss-of-effectiveness.toml", tmp_path)
+    designed = Designed(aso_ftc, "examples/three-tank/loss-of-effectiveness.toml", tmp_path, WITHOUT_PROOFS)
     designed.must_be_sound()
     losses = {"E_1": 0.3, "E_2": 0.2}
     begin = {"plant.t_fault_1": 300, "plant.t_fault_2": 300}
@@ -126,7 +127,7 @@ def plane(eigenvalues, period=1.0):
 
 
 def test_a_sensor_fault_is_distinguished_from_a_pump_fault(aso_ftc, python, tanks, tmp_path):
-    designed = Designed(aso_ftc, "examples/three-tank/sensor-fault.toml", tmp_path)
+    designed = Designed(aso_ftc, "examples/three-tank/sensor-fault.toml", tmp_path, WITHOUT_PROOFS)
     designed.must_be_sound()
     settings = {"plant.f_1": 1e-5, "plant.t_fault_1": 300, "plant.b_1": 0.02, "plant.t_bias": 1500}
     table, _ = coupled(python, designed, tanks, settings)
@@ -149,7 +150,7 @@ def test_a_sensor_fault_is_distinguished_from_a_pump_fault(aso_ftc, python, tank
 def test_fmpy_and_the_rust_master_agree_on_the_tanks(
     extrapolation, inputs, aso_ftc, python, tanks, tmp_path
 ):
-    designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path)
+    designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path, WITHOUT_PROOFS)
     steps = ("--step", 0.37, "--stop-time", 400)
     table, _ = coupled(python, designed, tanks, BOTH, *steps, *inputs)
     settings = [text for name, value in BOTH.items() for text in ("--set", f"{name}={value}")]
@@ -173,7 +174,7 @@ def test_a_sampled_controller_tolerates_any_communication_step(
     """If the step does not divide the sample time, commands and held measurements jitter."""
     change = ("sample_time = 1.0", f'sample_time = 1.0\nestimator = "{estimator}"')
     file = changed("examples/three-tank/plant.toml", tmp_path, change)
-    designed = Designed(aso_ftc, file, tmp_path)
+    designed = Designed(aso_ftc, file, tmp_path, WITHOUT_PROOFS)
     assert designed.report["sampling"] == {"sample_time": 1.0, "estimator": estimator}
     options = ("--step", step, "--stop-time", 1000, *inputs)
     table, _ = coupled(python, designed, tanks, BOTH, *options)
@@ -185,7 +186,7 @@ def test_a_sampled_controller_tolerates_any_communication_step(
 
 
 def test_without_friction_the_servo_moves_as_the_report_predicts(aso_ftc, python, servo, tmp_path):
-    designed = Designed(aso_ftc, "examples/dc-servo/plant.toml", tmp_path)
+    designed = Designed(aso_ftc, "examples/dc-servo/plant.toml", tmp_path, WITHOUT_PROOFS)
     designed.must_be_sound()
     settings = {"plant.friction": "false", "plant.f_u": 3, "plant.t_fault": 0.1}
     table, _ = coupled(python, designed, servo, settings, "--stop-time", 1, "--step", 1e-4)
@@ -204,7 +205,7 @@ def test_without_friction_the_servo_moves_as_the_report_predicts(aso_ftc, python
 
 
 def test_the_servo_returns_despite_fault_and_friction(aso_ftc, python, servo, tmp_path):
-    designed = Designed(aso_ftc, "examples/dc-servo/plant.toml", tmp_path)
+    designed = Designed(aso_ftc, "examples/dc-servo/plant.toml", tmp_path, WITHOUT_PROOFS)
     settings = {"plant.f_u": 3, "plant.t_fault": 0.1}
     table, _ = coupled(python, designed, servo, settings, "--stop-time", 1, "--step", 1e-4)
     turned = abs(table["plant.theta"])

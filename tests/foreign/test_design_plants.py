@@ -13,6 +13,7 @@ from pythonfmu import FmuBuilder
 from build import linearised_pendulum
 from conftest import ROOT
 from design_loop import packed_plant
+from design_oracle import WITHOUT_PROOFS
 from test_design_refusals import NO_DERIVATIVES, NO_EXCHANGE, SERVO, poorer
 from test_swap import shared_python
 
@@ -39,7 +40,7 @@ def variables(aso_ftc, folder, text):
     """The names of the variables of the controller FMU, or None if the file is refused before."""
     file, fmu = folder / "plant.toml", folder / "Made.fmu"
     file.write_text(text, encoding="utf-8")
-    done = aso_ftc("design", file, "--out", folder / "design.toml", "--fmu", fmu, "--force")
+    done = aso_ftc("design", file, "--out", folder / "design.toml", "--fmu", fmu, "--force", *WITHOUT_PROOFS)
     if done.returncode == 2:
         assert "the controller FMU has a variable" in done.stderr or "stands apart" in done.stderr, (
             done.stderr
@@ -97,7 +98,7 @@ feedback.eigenvalues = [-4.5, -6.0, -7.5, -9.0]
 observer.eigenvalues = [-30, -33, -36, -39, -42]
 """
     (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
-    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml", "--json")
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml", "--json", *WITHOUT_PROOFS)
     assert done.returncode in (0, 1), done.stderr
     report = json.loads(done.stdout)
     matrices = {matrix["name"]: np.array(matrix["values"]) for matrix in report["plant"]["matrices"]}
@@ -173,7 +174,7 @@ def test_an_fmu_without_a_step_is_linearised_like_one_with_a_step(aso_ftc, tmp_p
         poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu", *changes)
         text = 'states = ["theta", "omega"]\n' + SERVO
         (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
-        done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml", "--json")
+        done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml", "--json", *WITHOUT_PROOFS)
         assert done.returncode == 0, done.stderr
         matrices.append(json.loads(done.stdout)["plant"]["matrices"])
     for one, other in zip(*matrices, strict=True):

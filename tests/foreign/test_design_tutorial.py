@@ -9,6 +9,7 @@ import pytest
 
 from conftest import ROOT
 from design_loop import Designed, changed, coupled, packed_plant
+from design_oracle import WITHOUT_PROOFS
 
 TEXT = (ROOT / "docs" / "tutorials" / "controller.md").read_text(encoding="utf-8")
 COMMANDS = "".join(re.findall(r"^```sh\n(.*?)^```$", TEXT, flags=re.MULTILINE | re.DOTALL)).splitlines()
@@ -95,7 +96,7 @@ def test_without_the_operating_point_the_error_is_the_one_shown(aso_ftc, tmp_pat
 
 
 def test_the_error_of_the_constant_model_is_the_one_shown(aso_ftc, python, tmp_path):
-    designed = Designed(aso_ftc, "examples/dc-servo/plant.toml", tmp_path)
+    designed = Designed(aso_ftc, "examples/dc-servo/plant.toml", tmp_path, WITHOUT_PROOFS)
     settings = {"plant.friction": "false", "plant.r_u": 10}
     table, _ = coupled(python, designed, packed_plant(aso_ftc, "DcServo"), settings)
     error = 10 * table["time"][-1] - table["controller.f_hat"][-1]

@@ -186,7 +186,7 @@ stuck_at = { u1 = 0.3 }
 
 def designed(aso_ftc, folder, text):
     (folder / "plant.toml").write_text(text, encoding="utf-8")
-    return aso_ftc("design", folder / "plant.toml", "--out", folder / "design.toml", "--json")
+    return aso_ftc("design", folder / "plant.toml", "--out", folder / "design.toml", "--json", "--certificate-time", "0")
 
 
 def test_without_exact_allocation_the_feedback_is_designed_again_and_keeps_what_must_be_kept(aso_ftc, tmp_path):

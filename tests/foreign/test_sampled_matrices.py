@@ -9,7 +9,7 @@ from scipy.io import savemat
 from scipy.linalg import solve_discrete_are
 from scipy.signal import cont2discrete
 
-from design_oracle import closed_loop, commands, design_and_report, responses
+from design_oracle import WITHOUT_PROOFS, closed_loop, commands, design_and_report, responses
 from test_delays import response
 
 PERIOD = 0.05
@@ -48,7 +48,7 @@ def design(aso_ftc, tmp_path):
 def test_sampled_matrices_give_the_design_of_the_plant_that_was_sampled(design):
     reports = []
     for text in (PLANT, CONTINUOUS):
-        done = design(text, "--json")
+        done = design(text, "--json", *WITHOUT_PROOFS)
         assert done.returncode in (0, 1), done.stderr
         reports.append(json.loads(done.stdout))
     for one, other in zip(reports[0]["gains"], reports[1]["gains"], strict=True):
@@ -58,13 +58,13 @@ def test_sampled_matrices_give_the_design_of_the_plant_that_was_sampled(design):
 
 
 def test_the_worst_plant_of_sampled_matrices_is_a_plant_file(design, aso_ftc, tmp_path):
-    done = design(PLANT, "--worst-case", tmp_path / "worst.toml")
+    done = design(PLANT, "--worst-case", tmp_path / "worst.toml", *WITHOUT_PROOFS)
     assert done.returncode in (0, 1), done.stderr
     worst = tomllib.loads((tmp_path / "worst.toml").read_text(encoding="utf-8"))
     assert "matrices" not in worst
     np.testing.assert_allclose(worst["F_a"], F, atol=1e-9)
     np.testing.assert_allclose(worst["A"], A, rtol=0.11, atol=1e-9)
-    assert aso_ftc("design", tmp_path / "worst.toml", "--out", tmp_path / "other.toml").returncode in (0, 1)
+    assert aso_ftc("design", tmp_path / "worst.toml", "--out", tmp_path / "other.toml", *WITHOUT_PROOFS).returncode in (0, 1)
 
 
 def test_matlab_variables_with_a_sample_time_become_a_sampled_plant(aso_ftc, tmp_path):
@@ -196,7 +196,7 @@ def test_peak_delay_margin_bounds_and_worst_plant_of_samples_alone_are_those_of_
     faults = 'faults = [{ name = "f", actuator = "u1", bound = 2, rate_bound = 0.5 }]\n'
     tolerance = "robustness.tolerance = 0.05\n"
     text = only_samples(plant, f'estimator = "{estimator}"\n{faults}{tolerance}')
-    design, report = design_and_report(aso_ftc, tmp_path, text)
+    design, report = design_and_report(aso_ftc, tmp_path, text, ())
     a, b, c, period = map(np.array, plant)
     n = len(a)
     loop, entry, _, direct = closed_loop(design)

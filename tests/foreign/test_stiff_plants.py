@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 
-from design_oracle import closed_loop, commands, design_and_report
+from design_oracle import WITHOUT_PROOFS, closed_loop, commands, design_and_report
 
 NN6 = np.zeros((9, 9))
 NN6[[0, 2, 5, 7], [1, 3, 6, 8]] = 1
@@ -61,7 +61,7 @@ PLANTS = {
 }
 
 
-def designed(aso_ftc, folder, name, sampled):
+def designed(aso_ftc, folder, name, sampled, options=WITHOUT_PROOFS):
     """Plant, report and matrices of a linear-quadratic design with a fault of the first command."""
     *plant, period = PLANTS[name]
     a, b, c = map(np.array, plant)
@@ -70,7 +70,7 @@ def designed(aso_ftc, folder, name, sampled):
     text += f"feedback.Q = {[1.0] * len(a)}\nfeedback.R = {[1.0] * b.shape[1]}\n"
     text += f"observer.W = {[1.0] * len(a) + [100.0]}\nobserver.V = {[0.01] * len(c)}\n"
     text += '[[faults]]\nname = "f"\nactuator = "u1"\nbound = 1.0\nrate_bound = 1.0\n'
-    matrices, report = design_and_report(aso_ftc, folder, text)
+    matrices, report = design_and_report(aso_ftc, folder, text, options)
     assert matrices is not None, report
     return (a, b, c), report, matrices
 
@@ -106,7 +106,7 @@ def test_stiff_plants_are_designed_and_examined(aso_ftc, tmp_path, name, sampled
 
 def test_bounds_of_a_slow_sampled_loop_are_sums_of_its_impulse_response(aso_ftc, tmp_path):
     """The fault may change 16 times in a sample: more than at the samples, by no more than a jump between them."""
-    _, report, matrices = designed(aso_ftc, tmp_path, "AC4, missile", sampled=True)
+    _, report, matrices = designed(aso_ftc, tmp_path, "AC4, missile", sampled=True, options=())
     a, b, c, d = closed_loop(matrices)
     sums, state = np.abs(d), b
     for _ in range(200_000):

@@ -6,7 +6,7 @@ The benchmark of B. Wie and D. S. Bernstein (American Control Conference 1990): 
 import numpy as np
 import pytest
 
-from design_oracle import closed_loop, commands, design_and_report
+from design_oracle import WITHOUT_PROOFS, closed_loop, commands, design_and_report
 from split_mix import uniform
 
 SPRING = ["A[3][1]", "A[3][2]", "A[4][1]", "A[4][2]"]
@@ -75,7 +75,7 @@ def test_without_entries_that_vary_nothing_is_called_stable(aso_ftc, tmp_path):
     _, report = design_and_report(aso_ftc, tmp_path, text)
     tolerance = report["robustness"]["tolerance"]
     assert (tolerance["entries"], tolerance["varying"], tolerance["stable"]) == (0, [], None)
-    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--force")
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--force", *WITHOUT_PROOFS)
     assert "parameter tolerances: not examined, no entry of the plant varies" in done.stdout
     page = (tmp_path / "plant-report.html").read_text(encoding="utf-8")
     assert "Not examined: no entry" in page and "100 %" not in done.stdout
@@ -83,7 +83,7 @@ def test_without_entries_that_vary_nothing_is_called_stable(aso_ftc, tmp_path):
 
 def test_terminal_and_page_say_which_entries_vary(aso_ftc, tmp_path):
     design_and_report(aso_ftc, tmp_path, plant_file(0.5))
-    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--force")
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--force", *WITHOUT_PROOFS)
     stated = f"±50 % of {', '.join(SPRING)}, B[3][1]"
     assert f"parameter tolerances: 5 entries vary, {stated}" in done.stdout
     assert stated in (tmp_path / "plant-report.html").read_text(encoding="utf-8")
