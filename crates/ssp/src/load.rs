@@ -9,7 +9,7 @@ use fmu_description::limits::{HELP, exceeds};
 use fmu_description::package::Unpacked;
 
 use super::error::{SspError, semantic_error};
-use super::read;
+use super::read::{read_ssm, read_ssv};
 use super::source::{Base, Target};
 use super::structure::{
     Component, Connector, ConnectorKind, Content as Kind, DictionaryReference, DictionarySource,
@@ -290,10 +290,10 @@ impl Loader {
                 |sentence: String| semantic_error(binding.at.0, sentence).in_file(&file.shown);
             let files = &mut self.files;
             let values =
-                files.content(&binding.values, file, component, |all| &mut all.values, read::ssv);
+                files.content(&binding.values, file, component, |all| &mut all.values, read_ssv);
             let values = values.map_err(|error| error.or(here))?;
             let mapping = binding.mapping.as_ref().map(|mapping| {
-                files.content(mapping, file, component, |all| &mut all.mappings, read::ssm)
+                files.content(mapping, file, component, |all| &mut all.mappings, read_ssm)
             });
             let mapping = mapping.transpose().map_err(|error| error.or(here))?;
             self.count(values.parameters.len())?;

@@ -12,46 +12,6 @@ use super::structure::{
 use super::xml::{self, Node};
 use definitions::{conversion, definitions, value_type};
 
-/// Parses an SSD file.
-///
-/// Versions 1.x and 2.x are accepted. Geometry, metadata and annotations are skipped, except the
-/// step sizes of `com.opensimulationplatform`. Warnings are dropped; [`crate::open`] returns them.
-///
-/// # Errors
-///
-/// [`SspError`] with line and column if the file is not well-formed or has content that SSP does not allow; also if the
-/// file exceeds a limit.
-pub fn read_ssd(bytes: &[u8]) -> Result<SystemStructure, SspError> {
-    ssd(bytes).map(|(read, _)| read)
-}
-
-/// Parses an SSV file.
-///
-/// # Errors
-///
-/// Same as [`read_ssd`].
-pub fn read_ssv(bytes: &[u8]) -> Result<ParameterSet, SspError> {
-    ssv(bytes).map(|(read, _)| read)
-}
-
-/// Parses an SSM file.
-///
-/// # Errors
-///
-/// Same as [`read_ssd`].
-pub fn read_ssm(bytes: &[u8]) -> Result<ParameterMapping, SspError> {
-    ssm(bytes).map(|(read, _)| read)
-}
-
-/// Parses an SSB file.
-///
-/// # Errors
-///
-/// Same as [`read_ssd`].
-pub fn read_ssb(bytes: &[u8]) -> Result<SignalDictionary, SspError> {
-    ssb(bytes).map(|(read, _)| read)
-}
-
 /// The parsed content, and warnings with positions about undeclared prefixes and unknown content.
 type Read<T> = Result<(T, Vec<String>), SspError>;
 
@@ -67,8 +27,16 @@ fn read<T>(
     Ok((content(&node)?, warnings))
 }
 
-/// Parses an SSD file; also returns warnings.
-pub(super) fn ssd(bytes: &[u8]) -> Read<SystemStructure> {
+/// Parses an SSD file; also returns warnings with positions.
+///
+/// Versions 1.x and 2.x are accepted. Geometry, metadata and annotations are skipped, except the
+/// step sizes of `com.opensimulationplatform`.
+///
+/// # Errors
+///
+/// [`SspError`] with line and column if the file is not well-formed or has content that SSP does not allow; also if the
+/// file exceeds a limit.
+pub fn read_ssd(bytes: &[u8]) -> Read<SystemStructure> {
     let name = "SystemStructureDescription";
     read(bytes, name, name, |root| {
         let system = root.child("System")?;
@@ -83,18 +51,30 @@ pub(super) fn ssd(bytes: &[u8]) -> Read<SystemStructure> {
     })
 }
 
-/// Parses an SSV file; also returns warnings.
-pub(super) fn ssv(bytes: &[u8]) -> Read<ParameterSet> {
+/// Parses an SSV file; also returns warnings with positions.
+///
+/// # Errors
+///
+/// Same as [`read_ssd`].
+pub fn read_ssv(bytes: &[u8]) -> Read<ParameterSet> {
     read(bytes, "SystemStructureParameterValues", "ParameterSet", parameter_set)
 }
 
-/// Parses an SSM file; also returns warnings.
-pub(super) fn ssm(bytes: &[u8]) -> Read<ParameterMapping> {
+/// Parses an SSM file; also returns warnings with positions.
+///
+/// # Errors
+///
+/// Same as [`read_ssd`].
+pub fn read_ssm(bytes: &[u8]) -> Read<ParameterMapping> {
     read(bytes, "SystemStructureParameterMapping", "ParameterMapping", parameter_mapping)
 }
 
-/// Parses an SSB file; also returns warnings.
-pub(super) fn ssb(bytes: &[u8]) -> Read<SignalDictionary> {
+/// Parses an SSB file; also returns warnings with positions.
+///
+/// # Errors
+///
+/// Same as [`read_ssd`].
+pub fn read_ssb(bytes: &[u8]) -> Read<SignalDictionary> {
     read(bytes, "SystemStructureSignalDictionary", "SignalDictionary", signal_dictionary)
 }
 

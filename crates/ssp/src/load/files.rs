@@ -10,7 +10,7 @@ use fmu_description::limits::in_force;
 use fmu_description::package::{PackageError, TemporaryFolder, Unpacked, unpack_archive};
 
 use crate::error::{SspError, missing};
-use crate::read;
+use crate::read::{read_ssb, read_ssd};
 use crate::source::{Base, Target};
 use crate::structure::{ParameterMapping, ParameterSet, SignalDictionary, Source};
 use crate::tree::{Document, File};
@@ -99,7 +99,7 @@ impl Files {
             return Ok(known.clone());
         }
         let shown = target.shown.clone();
-        let structure = self.read(target, read::ssd)?;
+        let structure = self.read(target, read_ssd)?;
         let definitions = structure.definitions.clone();
         let file = Rc::new(File { shown, base, definitions });
         let document = Rc::new(Document { structure, file });
@@ -204,7 +204,7 @@ impl Files {
             Source::Inline(dictionary) => Ok((dictionary.clone(), file.shown.clone())),
             Source::File { uri, .. } => {
                 let target = file.base.resolve(uri).map_err(Missing::Reference)?;
-                let read = self.read(&target, read::ssb).map_err(Missing::Content)?;
+                let read = self.read(&target, read_ssb).map_err(Missing::Content)?;
                 Ok((read, target.shown))
             }
         }

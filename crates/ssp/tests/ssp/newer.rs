@@ -144,7 +144,7 @@ fn connectors_of_arrays_are_written_with_their_dimensions() {
     write(&opened.assembly, None, &path).unwrap();
     let text = String::from_utf8(entry(&path, "SystemStructure.ssd")).unwrap();
     assert!(text.contains("version=\"2.0\""), "{text}");
-    let structure = read_ssd(text.as_bytes()).unwrap();
+    let structure = read_ssd(text.as_bytes()).unwrap().0;
     let written = structure.system.elements.iter();
     let kinds = written.map(|element| element.base().connectors[0].kind_of_value.clone());
     let expected = [Dimension::Open, Dimension::Size(2)]
@@ -190,7 +190,7 @@ fn a_component_without_a_source_is_its_connectors_only() {
 fn one_element_with_a_text_states_a_single_value() {
     let values = r#"<ssv:Parameter name="a"><ssv:String><ssv:Value value="x y"/></ssv:String></ssv:Parameter>
 <ssv:Parameter name="b"><ssv:Enumeration><ssv:Value value="on"/></ssv:Enumeration></ssv:Parameter>"#;
-    let set = read_ssv(newer(&ssv(values)).as_bytes()).unwrap();
+    let set = read_ssv(newer(&ssv(values)).as_bytes()).unwrap().0;
     assert_eq!(set.parameters[0].value, ParameterValue::String("x y".to_owned()));
     assert_eq!(set.parameters[1].value, ParameterValue::Enumeration("on".to_owned(), None));
 }
@@ -201,26 +201,26 @@ fn what_is_of_ssp_2_is_written_as_ssp_2_and_reads_back() {
         a output <ssc:Dimension size=\"2\"/><ssc:Dimension/>\nk input <ssc:Clock/>\n\
         t input <ssd:Clock name=\"k\"/>";
     let text = newer(&ssd(&root(&component("a", "a.fmu", connectors, ""), ""), ""));
-    let structure = read_ssd(text.as_bytes()).unwrap();
+    let structure = read_ssd(text.as_bytes()).unwrap().0;
     let Element::Component(read) = &structure.system.elements[0] else { panic!("no component") };
     assert_eq!(read.base.connectors[1].kind, ConnectorKind::StructuralParameter);
     let expected = Type::Array(vec![Dimension::Size(2), Dimension::Open]);
     assert_eq!(read.base.connectors[4].kind_of_value, Some(expected));
     let written = render_ssd(&structure);
     assert!(written.contains("version=\"2.0\""), "{written}");
-    assert_eq!(read_ssd(written.as_bytes()).unwrap(), structure);
+    assert_eq!(read_ssd(written.as_bytes()).unwrap().0, structure);
     let values = r#"<ssv:Parameter name="a"><ssv:Boolean value="true false"/></ssv:Parameter>
 <ssv:Parameter name="b"><ssv:String><ssv:Value value="x y"/><ssv:Value value="z"/></ssv:String></ssv:Parameter>
 <ssv:Parameter name="c"><ssv:Int64 value="-9000000000"/></ssv:Parameter>
 <ssv:Parameter name="d"><ssv:UInt64 value="18446744073709551615"/></ssv:Parameter>"#;
-    let set = read_ssv(ssv(values).as_bytes()).unwrap();
+    let set = read_ssv(ssv(values).as_bytes()).unwrap().0;
     assert_eq!(set.parameters[2].value, ParameterValue::Long(-9_000_000_000));
     let words = ["x y".to_owned(), "z".to_owned()];
     assert_eq!(set.parameters[1].value, ParameterValue::Array("String".to_owned(), words.into()));
     let written = render_ssv(&set);
     assert!(written.contains("version=\"2.0\""), "{written}");
     assert!(written.contains("<ssv:UInt64 value=\"18446744073709551615\"/>"), "{written}");
-    assert_eq!(read_ssv(written.as_bytes()).unwrap(), set);
+    assert_eq!(read_ssv(written.as_bytes()).unwrap().0, set);
 }
 
 #[test]

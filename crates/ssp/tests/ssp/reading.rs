@@ -15,7 +15,7 @@ fn prefixes_are_free_and_a_type_may_stand_in_another_namespace_of_ssp() {
 <Connector name="y" kind="output"><Real/></Connector></Connectors></Component></Elements>
 <Connections><Connection startElement="a" startConnector="y" endConnector="z"><LinearTransformation factor="3"/></Connection></Connections>
 </System></SystemStructureDescription>"#;
-    let structure = read_ssd(text.as_bytes()).unwrap();
+    let structure = read_ssd(text.as_bytes()).unwrap().0;
     let Element::Component(component) = &structure.system.elements[0] else {
         panic!("expected a component")
     };
@@ -30,7 +30,7 @@ fn unknown_elements_geometry_and_foreign_annotations_are_skipped() {
     let geometry = r#"<ssd:ElementGeometry x1="0" y1="0" x2="1" y2="1"/>"#;
     let note = r#"<ssd:Annotations><ssc:Annotation type="org.x"><x:Connections xmlns:x="urn:x"/></ssc:Annotation></ssd:Annotations>"#;
     let text = ssd(&format!("{geometry}{}{note}", root("<ssd:System name='t'/>", "")), "");
-    let structure = read_ssd(text.as_bytes()).unwrap();
+    let structure = read_ssd(text.as_bytes()).unwrap().0;
     assert_eq!(structure.system.elements.len(), 1);
     assert_eq!(structure.system.connections.len(), 0);
 }
