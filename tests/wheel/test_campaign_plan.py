@@ -275,6 +275,7 @@ def test_a_measure_from_the_start_of_a_fault_is_nan_in_the_run_without_one(text)
         ({"parameters": {"plant.F_c": {"from": 2.0, "to": 1.0}}}, "from below to"),
         ({"parameters": {"plant.F_c": {"from": 2.0, "to": 3.0}}}, "steps"),
         ({"parameters": {"plant.F_c": {"values": []}}}, "at least one"),
+        ({"parameters": {"plant.F_c": 25.0}}, "parameters.plant.F_c: expected a list of values or a table"),
         ({"design": {"method": "sobol", "runs": 8}}, "at least one parameter"),
         ({"design": {"method": "monte-carlo"}}, "latin-hypercube"),
         ({"design": {"method": "table", "file": "no.csv"}}, "no.csv"),
@@ -351,6 +352,7 @@ def test_numbers_of_numpy_and_distributions_of_scipy_are_entries():
     one, other = (paper(parameters=entries, design=design, seed=np.uint8(3)) for entries in (frozen, named))
     assert columns(one) == columns(other) and one.describe() == other.describe()
     whole = paper(
+    assert columns(paper(parameters={"plant.F_c": range(20, 23)})) == {"plant.F_c": [20, 21, 22]}
         parameters={"n": {"distribution": stats.randint(1, 5), "set": "algorithm.jobs"}},
         design={"method": "random", "runs": 50},
     )

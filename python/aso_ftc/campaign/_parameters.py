@@ -91,12 +91,12 @@ class Parameter:
     def read(cls, name: str, entry: Any, nominal: Callable[[str], tuple[Any, str | None]]) -> Parameter:
         """Read one entry of ``[parameters]``; ``nominal`` gives start value and unit of a variable."""
         place = f"parameters.{name}"
-        if isinstance(entry, (list, tuple)):
+        if isinstance(entry, (list, tuple, range)):
             entry = {"values": list(entry)}
         elif _is_distribution(entry):
             entry = {"distribution": entry}
         if not isinstance(entry, Mapping):
-            raise fail(place, f"expected a table such as {{ from = 1.0, to = 2.0 }}, found {entry!r}")
+            raise fail(place, f"expected a list of values or a table such as {{ from = 1.0, to = 2.0 }}, found {entry!r}")
         entries = dict(entry)
         places = entries.pop("set", [name])
         places = [places] if isinstance(places, str) else places
