@@ -148,3 +148,7 @@ def test_a_search_that_cannot_be_done_says_what_it_needs(tmp_path):
     with pytest.raises(af.ConfigurationError, match="workers: 0: expected a whole number of at least 1"):
         enough.worst_case(tmp_path / "few", "y", workers=0)
     assert not (tmp_path / "few").exists() and np.isfinite(len(grid))
+    limited = campaign({"method": "random", "runs": 10}, 'parameter("a")', parameters=parameters, limits={"y": {"below": 29.0}})
+    (tmp_path / "rare" / "batch-00000" / "notes").mkdir(parents=True)
+    with pytest.raises(af.ConfigurationError, match="is not empty and has no campaign"):
+        limited.rare_event(tmp_path / "rare", "y")

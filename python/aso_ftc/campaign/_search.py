@@ -213,11 +213,16 @@ def rare_event(
     sign = 1.0 if kind == "below" else -1.0
     runs = campaign.plan.sampled.rows
     block = max(1, int(_KEPT * runs))
+    failures: list[BaseException] = []
 
     with _batches(campaign, path, limit, workers, scheduler) as batches:
 
         def distance(sample: Any) -> Numbers:
-            values, _ = batches(normal.cdf(np.asarray(sample)), sign)
+            try:
+                values, _ = batches(normal.cdf(np.asarray(sample)), sign)
+            except BaseException as error:
+                failures.append(error)
+                raise
             # A run that did not finish violates the limit by more than any other.
             distances: Numbers = np.clip(values - sign * bound, -1e300, 1e300)
             return distances[:, None]
@@ -230,7 +235,13 @@ def rare_event(
         simulation = turns.SubsetSampling(event, 2.0, _KEPT)
         simulation.setBlockSize(block)
         simulation.setMaximumOuterSampling(max(1, runs // block))
-        simulation.run()
+        try:
+            simulation.run()
+        except Exception:
+            # OpenTURNS makes a RuntimeError of every exception, with its traceback as the text.
+            if failures:
+                raise failures[0] from None
+            raise
         result = simulation.getResult()
         probability = float(result.getProbabilityEstimate())
         variation = float(result.getCoefficientOfVariation())
