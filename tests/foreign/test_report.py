@@ -689,6 +689,17 @@ def test_a_range_above_the_largest_number_is_drawn_and_a_long_name_fits_a_narrow
 
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_without_javascript_there_are_a_picture_and_the_tables_but_no_controls(aso_ftc, write, tmp_path):
+    report(aso_ftc, write("own.csv", frame()))
+    with browser(tmp_path / "profile") as page:
+        page.call("Emulation.setScriptExecutionDisabled", value=True)
+        page.open((tmp_path / "own.html").as_uri())
+        heights = "['noscript svg', 'table', '#controls'].map((place) => document.querySelector(place).getBoundingClientRect().height)"
+        picture, table, controls = page.evaluate(heights)
+        assert picture > 300 and table > 50 and controls == 0
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_rows_at_one_time_are_drawn_also_where_times_are_seconds_apart(aso_ftc, write, tmp_path):
     with browser(tmp_path / "profile") as page:
         # The next number after 1e15 is 0.125 away, that after 1e17 is 16 away.
