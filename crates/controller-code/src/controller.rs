@@ -6,11 +6,11 @@ use nalgebra::DMatrix;
 
 use super::Precision;
 use super::detection::{self, Detection};
+use super::matrices::Matrices;
 use super::parts::{Signal, first_at};
 use super::reconfiguration::Reconfiguration;
 use super::schedule::Schedule;
 use super::symbols::Matrix;
-use super::values::Matrices;
 use crate::Error;
 
 /// The controller of a sampled design: matrices, signals, switches. The shapes are those of the design file.

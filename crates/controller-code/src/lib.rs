@@ -10,6 +10,7 @@ mod constants;
 mod controller;
 mod detection;
 mod fields;
+mod matrices;
 mod names;
 mod numbers;
 mod parts;

@@ -12,9 +12,9 @@ use aso_controller::design::{self, schedule};
 use nalgebra::DMatrix;
 
 use super::Precision;
+use super::matrices::Matrices;
 use super::parts::Signal;
 use super::symbols::{Matrix, Vector};
-use super::values::Matrices;
 use crate::Error;
 
 /// The schedule of a controller.
