@@ -173,32 +173,27 @@ def _quiet() -> Iterator[None]:
 def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     """A client of the scheduler at an address, or of local processes."""
     distributed = package("distributed")
-    if scheduler is not None:
-        if workers is not None:
-            raise ConfigurationError("workers are for local processes, a scheduler has its own")
-        try:
-            client = distributed.Client(scheduler, timeout=10, set_as_default=False)
-        except (OSError, ValueError, TimeoutError) as error:
-            raise Error(f"no Dask scheduler answers at {scheduler}: {error}", "Scheduler") from None
-        try:
-            yield client
-        finally:
-            with contextlib.suppress(Exception):
-                client.close(timeout=5)
-        return
-    count = os.cpu_count() or 1 if workers is None else workers
-    with tempfile.TemporaryDirectory(prefix="aso-ftc-") as place, contextlib.ExitStack() as opened:
-        with _without_interrupts():
-            cluster = distributed.LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                processes=True,
-                dashboard_address=":0",
-                local_directory=place,
-                silence_logs=logging.CRITICAL,
-            )
-            opened.callback(cluster.close, timeout=10)
-        client = distributed.Client(cluster, set_as_default=False)
+    with contextlib.ExitStack() as opened:
+        if scheduler is not None:
+            if workers is not None:
+                raise ConfigurationError("workers are for local processes, a scheduler has its own")
+            try:
+                client = distributed.Client(scheduler, timeout=10, set_as_default=False)
+            except (OSError, ValueError, TimeoutError) as error:
+                raise Error(f"no Dask scheduler answers at {scheduler}: {error}", "Scheduler") from None
+        else:
+            place = opened.enter_context(tempfile.TemporaryDirectory(prefix="aso-ftc-"))
+            with _without_interrupts():
+                cluster = distributed.LocalCluster(
+                    n_workers=os.cpu_count() or 1 if workers is None else workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address=":0",
+                    local_directory=place,
+                    silence_logs=logging.CRITICAL,
+                )
+                opened.callback(cluster.close, timeout=10)
+            client = distributed.Client(cluster, set_as_default=False)
         try:
             yield client
         finally:
