@@ -11,7 +11,7 @@
 //! |---|---|
 //! | S and T as systems, their peaks | [`Loop::sensitivity`], [`Loop::complementary`], [`crate::response::h_infinity`] |
 //! | changes of gain and phase in all channels at once | [`disk_margin`] |
-//! | changes of gain, phase and delay in one channel | [`channel_margins`] |
+//! | changes of gain, phase and delay in one channel | [`channel_margins`], [`sampled_channel_delay`] |
 //! | a delay in all channels | [`delay_margin`], [`sampled_delay_margin`] |
 //! | several of these margins and peaks at one point of a loop | [`OpenedLoop`] |
 //! | the longest time over which signals may be held | [`longest_hold`], [`longest_period`] |
@@ -41,7 +41,7 @@ mod worst_case;
 
 pub use channel::{ChannelMargins, channel_margins};
 pub use choice::least_sensitive;
-pub use delay::{delay_margin, sampled_delay_margin};
+pub use delay::{delay_margin, sampled_channel_delay, sampled_delay_margin};
 pub use disk::{DiskMargin, disk_margin, scaled_peak};
 pub use entries::{PeakDerivatives, SensitivityPeak, peak_derivatives};
 pub use family::{PlantFamily, ToleranceCase, ToleranceSearch};

@@ -32,7 +32,8 @@ pub struct ChannelMargins {
     /// The frequency of `phase`, in rad per unit of time; zero if |L| is never 1.
     pub phase_frequency: f64,
     /// The delay, in the unit of time, below which the loop is stable; infinite if |L| is never 1. In sampled
-    /// time delays are whole samples, and longer ones may be stable, too, see [`super::delay_margin`].
+    /// time delays are whole samples, and longer ones may be stable, too; see [`super::delay_margin`], and
+    /// [`super::sampled_channel_delay`] for fractions of a sample.
     pub delay: f64,
 }
 

@@ -21,6 +21,8 @@ const PARTS: u32 = 4;
 const CLEAR: f64 = 1e-6;
 /// Instability above which a delay counts as unstable, relative to the decay of the loop without a delay.
 const RELATIVE: f64 = 0.1;
+/// Above this number of states of the loop, the delay of a channel is that of whole samples.
+const LARGE: usize = 50;
 
 /// Computes the delay margin: the smallest delay, common to all commands (or to all measurements),
 /// at which the loop is on the limit of stability; infinite if there is none.
@@ -120,24 +122,69 @@ pub(super) fn refine(
     estimate: f64,
 ) -> Result<f64, Error> {
     let period = period_of(controller)?;
-    let parts = if plant.domain == Domain::Continuous { PARTS } else { 1 };
+    let shown = |part: f64| stable_delay(plant, controller, period, part);
+    let instability = |count: usize, part: f64| {
+        instability(&delayed(plant, controller, period, count, part)?, controller.domain)
+    };
+    first_unstable(plant.domain, period, estimate, shown, instability)
+}
+
+/// Computes the delay margin of one channel of a sampled loop: the smallest delay of this command, or of this
+/// measurement alone, at which the loop with the continuous plant becomes unstable.
+///
+/// `plant`, `controller`: see [`sampled_delay_margin`]; `at`, `channel`: the place of the delay; `estimate`: the delay
+/// of [`super::channel_margins`], which is right for whole samples. Method: eigenvalues, as for
+/// [`sampled_delay_margin`]. Above 50 states of the loop the result is the estimate.
+///
+/// # Errors
+///
+/// Same as [`sampled_delay_margin`].
+///
+/// # Panics
+///
+/// If there is no such channel.
+pub fn sampled_channel_delay(
+    plant: &StateSpace,
+    controller: &StateSpace,
+    (at, channel): (Point, usize),
+    estimate: f64,
+) -> Result<f64, Error> {
+    let period = period_of(controller)?;
+    if plant.a.nrows() + controller.a.nrows() > LARGE {
+        return Ok(estimate);
+    }
+    let instability = |count: usize, part: f64| {
+        let late = late_channel(plant, period, (at, channel), count, part)?;
+        instability(&Loop::new(late, controller.clone())?.dynamics(), controller.domain)
+    };
+    first_unstable(plant.domain, period, estimate, |_| Ok(f64::NEG_INFINITY), instability)
+}
+
+/// The smallest unstable delay, by tests at parts of a sample.
+///
+/// `domain`: that of the plant; `estimate`: the delay up to which whole samples are stable; `shown`: from a fraction of
+/// a sample, the longest delay in samples, with this fraction, that is known to be stable; `instability`: from whole
+/// samples and a fraction of one.
+fn first_unstable(
+    domain: Domain,
+    period: f64,
+    estimate: f64,
+    shown: impl Fn(f64) -> Result<f64, Error>,
+    instability: impl Fn(usize, f64) -> Result<f64, Error>,
+) -> Result<f64, Error> {
+    let parts = if domain == Domain::Continuous { PARTS } else { 1 };
     let step = 1.0 / f64::from(parts);
     let value = |samples: f64| {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 20")]
         let count = samples as usize;
-        let dynamics = delayed(plant, controller, period, count, samples.fract())?;
-        instability(&dynamics, controller.domain)
+        instability(count, samples.fract())
     };
     // A mode that decays slowly without a delay, such as a resonance, grows slowly with one.
     let clear = CLEAR.min(RELATIVE * value(0.0)?.abs());
     // In samples: the first unstable tested delay, and the delay up to which sweeps show all tested ones to be stable.
     let (mut unstable, mut proven) = (f64::INFINITY, f64::INFINITY);
     for part in (0..parts).map(|at| f64::from(at) * step) {
-        let stable = if part > 0.0 {
-            stable_delay(plant, controller, period, part)?
-        } else {
-            (estimate / period).floor()
-        };
+        let stable = if part > 0.0 { shown(part)? } else { (estimate / period).floor() };
         proven = proven.min(stable);
         for delay in (0..=REFINED_SAMPLES).map(|samples| f64::from(samples) + part) {
             if delay >= unstable {
@@ -239,4 +286,59 @@ fn delayed(
         dynamics.view_mut((at(age), at(age - 1)), (m, m)).fill_with_identity();
     }
     Ok(dynamics)
+}
+
+/// The sampled plant with a delay of `samples` samples and the fraction `part` (0 to 1) of a sample in one command or
+/// one measurement. States: those of the plant, the previous commands, then the delayed signal, the newest first.
+fn late_channel(
+    plant: &StateSpace,
+    period: f64,
+    (at, channel): (Point, usize),
+    samples: usize,
+    part: f64,
+) -> Result<StateSpace, Error> {
+    let (n, m) = plant.b.shape();
+    let [a, _, held] = hold_late(plant, period, 0.0)?;
+    let (newest, oldest) = (n + m, n + m + samples);
+    let order = oldest + 1;
+    let mut late = StateSpace {
+        a: a.clone().resize(order, order, 0.0),
+        b: stacked(&held, &DMatrix::identity(m, m)).resize_vertically(order, 0.0),
+        c: beside(&plant.c, &plant.d).resize_horizontally(order, 0.0),
+        d: DMatrix::zeros(plant.c.nrows(), m),
+        domain: Domain::Sampled { period },
+    };
+    for state in newest..oldest {
+        late.a[(state + 1, state)] = 1.0;
+    }
+    match at {
+        Point::Input => {
+            let [_, old, new] = hold_late(plant, period, part)?;
+            late.b.view_mut((0, channel), (n, 1)).fill(0.0);
+            late.b[(newest, channel)] = 1.0;
+            late.a.view_mut((0, oldest), (n, 1)).copy_from(&old.columns(channel, 1));
+            let mut newer = if samples > 0 {
+                late.a.view_mut((0, oldest - 1), (n, 1))
+            } else {
+                late.b.view_mut((0, channel), (n, 1))
+            };
+            newer.copy_from(&new.columns(channel, 1));
+            late.c.column_mut(n + channel).fill(0.0);
+            late.c.columns_mut(oldest, 1).copy_from(&plant.d.columns(channel, 1));
+        }
+        // The measurement at the fraction of a sample before the next one.
+        Point::Output => {
+            let (phi, gamma) = if part > 0.0 {
+                hold_inputs(&plant.a, &plant.b, (1.0 - part) * period)?
+            } else {
+                (a, held)
+            };
+            let row = plant.c.rows(channel, 1);
+            late.a.view_mut((newest, 0), (1, n)).copy_from(&(row * phi));
+            late.b.rows_mut(newest, 1).copy_from(&(row * gamma + plant.d.rows(channel, 1)));
+            late.c.row_mut(channel).fill(0.0);
+            late.c[(channel, oldest)] = 1.0;
+        }
+    }
+    Ok(late)
 }

@@ -7,7 +7,8 @@ use control::response::h_infinity;
 use control::robustness::{
     EntryFamily, Loop, Point, SensitivityPeak, Tolerances, channel_margins, delay_margin,
     disk_margin, longest_hold, longest_period, noise_gains, peak_derivatives,
-    regulator_of_same_speed, sampled_delay_margin, scaled_peak, tolerance_test,
+    regulator_of_same_speed, sampled_channel_delay, sampled_delay_margin, scaled_peak,
+    tolerance_test,
 };
 use control::stability::instability;
 use control::{Domain, Error, StateSpace};
@@ -355,6 +356,35 @@ fn a_loop_may_bear_every_whole_sample_of_delay_and_not_a_part_of_one() {
         x.norm()
     };
     assert!(grown(0.99 * delay) < 1e-3 && grown(1.01 * delay) > 1e3, "{delay}");
+    for at in [Point::Input, Point::Output] {
+        let alone = sampled_channel_delay(&plant, &controller, (at, 0), 0.0).expect("a delay");
+        assert_near(alone, delay, 1e-9, "delay of the only channel");
+    }
+}
+
+#[test]
+fn each_channel_of_uncoupled_sampled_loops_bears_the_delay_of_its_loop() {
+    let domain = Domain::Sampled { period: 0.5 };
+    let loops = [(-1.0, 3.0), (0.0, 1.2)];
+    let diagonal = |[x, y]: [f64; 2]| matrix(2, 2, &[x, 0.0, 0.0, y]);
+    let both = StateSpace {
+        a: diagonal(loops.map(|(pole, _)| pole)),
+        b: diagonal([1.0, 1.0]),
+        c: diagonal([1.0, 1.0]),
+        d: diagonal([0.0, 0.0]),
+        domain: Domain::Continuous,
+    };
+    let controller = gain(&diagonal(loops.map(|(_, k)| -k)), domain);
+    for (channel, (pole, k)) in loops.into_iter().enumerate() {
+        let one = |value| matrix(1, 1, &[value]);
+        let plant =
+            StateSpace { a: one(pole), b: one(1.0), c: one(1.0), d: one(0.0), ..both.clone() };
+        let expected = sampled_delay_margin(&plant, &gain(&one(-k), domain)).expect("a delay");
+        for at in [Point::Input, Point::Output] {
+            let computed = sampled_channel_delay(&both, &controller, (at, channel), 0.0);
+            assert_near(computed.expect("a delay"), expected, 1e-9, "delay");
+        }
+    }
 }
 
 /// x'' = -2 zeta x' - x - k x(t - tau) decays at zeta - k sin(tau) / 2 for small zeta and k. The hold delays by half

@@ -9,7 +9,7 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
 use crate::assess::family::{common, reported};
-use crate::assess::robustness::{Physical, loop_points};
+use crate::assess::robustness::{Physical, loop_points, refine_delays};
 use crate::budget::Budget;
 use crate::matrix::rows;
 use crate::plant::linear::LinearPlant;
@@ -129,7 +129,9 @@ impl Examination<'_> {
             Domain::Continuous => delay_margin(&closed_loop),
             Domain::Sampled { .. } => sampled_delay_margin(&plant, &controller),
         };
-        Ok((loop_points(&closed_loop, &inputs, measurements)?, delay?))
+        let mut points = loop_points(&closed_loop, &inputs, measurements)?;
+        refine_delays(&mut points, &plant, &controller)?;
+        Ok((points, delay?))
     }
 
     /// Returns the equilibrium of the loop, and the actuator with its command if it is gone.

@@ -14,7 +14,7 @@ use control::controller::CompleteController;
 use control::response::{frequency_grid, h_infinity};
 use control::robustness::{
     DiskMargin, Loop, OpenedLoop, Point, SensitivityPeak, Tolerances, longest_hold, longest_period,
-    peak_derivatives, regulator_of_same_speed,
+    peak_derivatives, regulator_of_same_speed, sampled_channel_delay,
 };
 use control::tracking::IntegralAction;
 use control::{Domain, Error, StateSpace};
@@ -158,7 +158,8 @@ pub(crate) fn margins(
             ),
         },
     );
-    let (points, delay, hold) = (points?, delay?, hold?);
+    let (mut points, delay, hold) = (points?, delay?, hold?);
+    refine_delays(&mut points, plant, controller)?;
     let (noise, noise_together) = noise::noise(designed, closed_loop, &physical.estimates, limits)?;
     Ok(Margins { points, delay, hold, noise, noise_together })
 }
@@ -173,6 +174,24 @@ pub(crate) fn loop_points(
         point(&OpenedLoop::new(closed_loop, at)?, name, signals_at(at, inputs, outputs))
     };
     POINTS.into_par_iter().map(point).collect()
+}
+
+/// Replaces the delay margins of the channels of a sampled loop, which are those of whole samples, by those of all
+/// delays.
+pub(crate) fn refine_delays(
+    points: &mut [LoopPoint],
+    plant: &StateSpace,
+    controller: &StateSpace,
+) -> Result<(), Error> {
+    if controller.domain == Domain::Continuous {
+        return Ok(());
+    }
+    points.par_iter_mut().zip(POINTS).try_for_each(|(point, (at, _))| {
+        point.channels.par_iter_mut().enumerate().try_for_each(|(index, channel)| {
+            channel.delay = sampled_channel_delay(plant, controller, (at, index), channel.delay)?;
+            Ok::<_, Error>(())
+        })
+    })
 }
 
 /// Returns the signals at a point of the loop.
