@@ -17,7 +17,8 @@ pub(super) fn bounds(report: &Report) -> Markup {
     html! {
         p {
             "The peak-to-peak (L1) gain is the largest magnitude that a quantity can reach while \
-             the fault, or its rate, stays within plus and minus one. The bound is the gain of the \
+             the fault, or its rate, stays within plus and minus one. The gain of the rate does not \
+             count what the commands leave of the fault itself. The bound is the gain of the \
              fault times its " code { "bound" } " in the plant file. A constant fault that has a "
             code { "rate_bound" } ", too, has a smaller one if the gain of its rate times "
             code { "rate_bound" } ", with what the commands leave of the fault, is less; without "

@@ -61,8 +61,9 @@ fn cases(cases: &[FallbackCase]) -> Markup {
     ];
     html! {
         p {
-            "The price is the root-mean-square value of a measurement under white noise on the commands, \
-             relative to that of the intact plant with the intact controller: the largest one."
+            "The price is the root-mean-square value of a measurement under white noise, which acts as on the \
+             commands of the intact plant, relative to that of the intact plant with the intact controller: \
+             the largest one."
         }
         (table_of("Cases of the fall-back", cases, &columns))
     }

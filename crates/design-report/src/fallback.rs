@@ -54,8 +54,8 @@ pub struct FallbackCase {
     /// Largest delay, s, common to all commands.
     #[schemars(with = "Option<f64>")]
     pub delay_margin: f64,
-    /// H2 norm from white noise on the commands to each measurement, relative to that of the intact plant
-    /// with the intact controller.
+    /// H2 norm from white noise to each measurement, relative to that of the intact plant with the intact controller.
+    /// The noise acts as on the commands of the intact plant in all cases: a failure does not lessen it.
     pub price: Vec<Number>,
     /// The commands at rest.
     pub commands: Vec<Number>,

@@ -418,8 +418,8 @@ pub struct Bound {
     pub unit: Option<String>,
     /// Peak-to-peak (L1) gain from the fault.
     pub gain_of_fault: f64,
-    /// Peak-to-peak (L1) gain from the rate of the fault; without limit if a constant fault leaves a
-    /// lasting error.
+    /// Peak-to-peak (L1) gain from the rate of the fault, without what the commands leave of the fault itself; without
+    /// limit if a constant fault leaves a lasting error of its estimate.
     #[schemars(with = "Option<f64>")]
     pub gain_of_rate: f64,
     /// The bound of the error by the bound of the fault or, if it is smaller, by that of its rate; none if the file
@@ -500,9 +500,9 @@ pub struct Curve {
     pub name: String,
     /// Its unit.
     pub unit: Option<String>,
-    /// Largest absolute value.
+    /// The value farthest from 0, with its sign.
     pub peak: f64,
-    /// Time of the largest absolute value, in s.
+    /// Time of `peak`, in s.
     pub peak_time: f64,
     /// Settling time in s: from then on the distance of the signal from its final value is at most 2 % of the largest
     /// such distance; null if it never is, as in a signal that only rounding moves.
