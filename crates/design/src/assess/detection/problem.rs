@@ -6,7 +6,7 @@ use control::faults::{Fault, FaultEntry};
 use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
-use crate::report::number::round;
+use crate::report::number::{round, rounded};
 use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::detection::DetectionRequest;
@@ -133,9 +133,11 @@ impl Problem {
         self.plant.w = noise;
         self.origin_of_process_noise = if factor > 0.0 {
             format!(
-                "The plant file states none. {source} that vary as noise, with {factor} times the variance of \
-                 their sizes within one time constant of the loop, make the filter as fast as the loop; \
-                 with less noise in the plant there are fewer false alarms."
+                "The plant file states none. {source} that vary as noise, with {} times the variance of \
+                 their sizes within one time constant of the loop, make the filter as fast as the loop. \
+                 False alarms and delays are those under this noise; with less in the plant there are \
+                 fewer false alarms, and with cumulative sums the mean delays are longer.",
+                rounded(factor)
             )
         } else {
             "None: the filter is fast enough without.".to_owned()
