@@ -35,10 +35,11 @@ pub struct SampledLoop<'a> {
 /// the samples, where the estimates are computed; `width`: see [`peak_gain`]. Each result has a row for each
 /// output and q columns.
 ///
-/// The fault is constant over each part, with any sequence of values, and x is read at the start of each part; with
-/// growing N the gains approach those of arbitrary faults, with an error of the order of 1/N. With N = 1 they are the
-/// gains of [`super::fault_gains`], the gain from f' multiplied by T: the fault changes only at the samples, and x is
-/// read only there. Entry (i, j) is an upper bound of the sum of |`h_ij`| over all parts and samples.
+/// The fault is constant over each part, with any sequence of values, and has any other value at the sample itself,
+/// where the measurements may contain it; x is read at the start of each part. With growing N the gains approach those
+/// of arbitrary faults, with an error of the order of 1/N; a mode that oscillates several times in a part needs a
+/// larger N. With N = 1 they are the gains of [`super::fault_gains`], the gain from f' multiplied by T, unless a fault
+/// acts on states and measurements: the fault changes only at the samples, and x is read only there. Entry (i, j) is an upper bound of the sum of |`h_ij`| over all parts and samples.
 ///
 /// Source: lifting of a sampled loop, T. Chen and B. A. Francis, Optimal Sampled-Data Control
 /// Systems, Springer (1995), chapter 10.
@@ -123,17 +124,18 @@ impl<'a> Lifted<'a> {
         self.plant.f_a.rows(self.states, all - self.states).into_owned()
     }
 
-    /// The effects of f, with one value for each part.
+    /// The effects of f, with one value for each part, and then the value at the sample, which the measurements see.
     fn faults(&self) -> Effects {
         let count = self.parts();
-        let filter = |j| self.filter_entry() * f64::from(u8::from(j == 0));
+        let at_sample = |j| f64::from(u8::from(j == count));
+        let filter = |j| self.filter_entry() * at_sample(j);
         let states_after = |j| stacked(&self.effect(count, j), &filter(j));
         Effects {
-            states_after: (0..count).map(states_after).collect(),
+            states_after: (0..=count).map(states_after).collect(),
             is_known: false,
-            outputs: (0..count).map(|i| (0..count).map(|j| self.effect(i, j)).collect()).collect(),
-            next_error: vec![0.0; count],
-            present_error: (0..count).map(|j| if j == 0 { -1.0 } else { 0.0 }).collect(),
+            outputs: (0..count).map(|i| (0..=count).map(|j| self.effect(i, j)).collect()).collect(),
+            next_error: vec![0.0; count + 1],
+            present_error: (0..=count).map(|j| -at_sample(j)).collect(),
         }
     }
 

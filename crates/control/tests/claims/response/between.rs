@@ -3,7 +3,7 @@
 use crate::paper::CONTROLLER_POLES;
 use control::aso::{Estimator, FaultyPlant, Gains};
 use control::controller::controller;
-use control::faults::ExtendedPlant;
+use control::faults::{ExtendedPlant, Fault, FaultEntry, FaultKind};
 use control::hold::zero_order_hold;
 use control::placement::real_poles;
 use control::response::{
@@ -150,6 +150,31 @@ fn a_fault_that_no_command_reaches_and_that_is_known_causes_no_error() {
         }
         let rates = fault_rate_system(&plant, &gains, domain).unwrap();
         assert!((peak_gain(&rates, WIDTH).unwrap().upper[(1, 1)] - 1.0).abs() < 2.0 * WIDTH);
+    }
+}
+
+/// x' = -x + f, and y = x - f / 2 at the samples, which the filter y_f follows with the gain 1: the worst f has one sign
+/// between the samples and the other one at them.
+#[test]
+fn a_fault_may_have_another_value_at_a_sample_than_beside_it() {
+    let period = 0.5;
+    let one = |value| DMatrix::from_element(1, 1, value);
+    let column = |value| DVector::from_element(1, value);
+    let entry = FaultEntry::Both { states: column(1.0), measurements: column(-0.5) };
+    let fault = Fault { entry, kind: FaultKind::Constant };
+    let extended = ExtendedPlant::new(&one(-1.0), &one(1.0), &one(1.0), &[fault], &[3.0]).unwrap();
+    let feedback = sampled_poles(&real_poles(&[-1.0]), period).unwrap();
+    let observer = sampled_poles(&real_poles(&[-1.0, -1.5, -2.0]), period).unwrap();
+    let estimator = Estimator::Prediction;
+    let designed = design(&extended, period, estimator, &feedback, &observer, None).unwrap();
+    let (plant, mut gains) = (designed.plant, designed.gains);
+    gains.k_x.fill(0.0);
+    gains.k_f.fill(0.0);
+    let closed = SampledLoop { extended: &extended, plant: &plant, gains: &gains, period };
+    for parts in [1, 4] {
+        let [of_faults, ..] = gains_between_samples(&closed, parts, &[1], WIDTH).unwrap();
+        let gain = of_faults[(0, 0)];
+        assert!((gain / 1.5 - 1.0).abs() < 2.0 * WIDTH, "{parts}: {gain}");
     }
 }
 
