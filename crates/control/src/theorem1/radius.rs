@@ -3,7 +3,7 @@
 use super::{ENLARGEMENTS, check_system};
 use crate::lmi::definite::margin;
 use crate::lmi::{Affine, Outcome, Problem, norm_below};
-use crate::lyapunov::lyapunov;
+use crate::lyapunov::{CONTINUOUS, lyapunov};
 use crate::product::AccurateProduct;
 use crate::stability::instability;
 use crate::svd::norm_2;
@@ -92,7 +92,8 @@ pub fn smallest_radius(
 /// norm(P(D `E_ii` D) G) = s for every i that w moves, otherwise `d_i` = 1.
 fn best_surplus(f: &DMatrix<f64>, g: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
     let n = f.nrows();
-    let p_times_g = |q: &DMatrix<f64>| Ok::<_, Error>(lyapunov(f, q)?.p * g);
+    // Not refused for its residual: entries of P(E_ij) may be zero but for rounding. The caller verifies the result.
+    let p_times_g = |q: &DMatrix<f64>| Ok::<_, Error>(CONTINUOUS.solve(f, q)? * g);
     let unit = |row: usize, col: usize| {
         let mut unit = DMatrix::zeros(n, n);
         (unit[(row, col)], unit[(col, row)]) = (1.0, 1.0);

@@ -118,6 +118,16 @@ mod free {
         assert!(radius(0.0) <= 0.0);
     }
 
+    /// A trolley with one measurement, the observer at -3, -4 and -5: solutions of F' P + P F = -`E_ij` have entries that
+    /// are zero. The radius is that of scipy's `minimize` over the factors of Y.
+    #[test]
+    fn zeros_in_solutions_for_indefinite_matrices_do_not_prevent_a_radius() {
+        let f = matrix(3, 3, &[-11.5, 1.0, 0.0, -41.25, -0.5, -0.5, 120.0, 0.0, 0.0]);
+        let g = matrix(3, 1, &[0.0, -0.5, 0.0]);
+        let ratio = smallest_radius(&f, &g, 1.0).unwrap().optimal().unwrap().delta / 3.270_170_4;
+        assert!(ratio > 1.0 - 1e-6 && ratio < 1.001, "{ratio}");
+    }
+
     /// For the paper's example the radius decreases by a factor of 6, for the corrected printed
     /// gains by 3.
     #[test]
