@@ -333,6 +333,17 @@ def test_a_plant_that_no_bandwidth_makes_robust_keeps_the_speed_of_the_plant(aso
     assert "a bandwidth of 0.013 rad/s" in report["feedback"]["method"]
 
 
+@pytest.mark.parametrize("cells", [30, 40])
+def test_a_rod_that_is_heated_at_one_end_and_measured_at_the_other_has_a_low_peak(aso_ftc, tmp_path, cells):
+    """Most eigenvalues are those of neighbouring cells, up to 160 times as fast as the response at the other end."""
+    a = 4.0 * cells**2 * (np.eye(cells, k=1) + np.eye(cells, k=-1) - 2 * np.eye(cells))
+    plant = (a.tolist(), np.eye(cells)[:, :1].tolist(), np.eye(cells)[-1:].tolist())
+    (tmp_path / "rod.toml").write_text(f"{written(plant)}actuator_faults = \"all\"\n", encoding="utf-8")
+    done = aso_ftc("design", tmp_path / "rod.toml", "--out", tmp_path / "design.toml", "--json", "--certificate-time", "0")
+    assert done.returncode in (0, 1), done.stderr
+    assert max(point["judged"] for point in json.loads(done.stdout)["robustness"]["points"]) < 1.5
+
+
 def test_measurements_without_units_do_not_change_bandwidths_of_a_plant_that_is_green_with_units(aso_ftc, tmp_path):
     a, b, c = PLANTS["quadruple tank"]
     scaled = (a, b, (np.diag([1e3, 1e-3]) @ c).tolist())

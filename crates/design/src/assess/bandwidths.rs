@@ -54,7 +54,9 @@ const OBSERVER_PER_SAMPLE: f64 = 1.5;
 const WITHOUT_SPEED: f64 = 1.0;
 
 /// Returns `file` with the bandwidths that it leaves open: those of the first candidate with a green verdict, otherwise
-/// those of the best stable one, see [`Judged::is_better`].
+/// those of the best stable one, see [`Judged::is_better`]. If the peaks of S of all candidates are red, or they have no
+/// gains, candidates relative to the slowest eigenvalue follow, if that is slower than all of them: a measurement far
+/// from the command, as in diffusion, does not see the speed of most eigenvalues.
 ///
 /// Candidates that are left when the time of `budget` is over are not tried.
 ///
@@ -67,35 +69,46 @@ pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantF
         return Ok(file.clone());
     }
     let plant = LinearPlant::of(file)?;
-    let speed = speed(file, &plant)?;
+    let [speed, slowest] = speeds(file, &plant)?;
     let large = plant.a.nrows() >= LARGE;
     let candidates = &CANDIDATES[..if large { OF_LARGE } else { CANDIDATES.len() }];
-    let examine = |&(of_feedback, of_observer): &(f64, f64)| {
-        let feedback = of_feedback * speed;
-        let other = with(file, feedback, of_observer * feedback);
-        let judged = judged(&other, !large);
-        (other, judged)
-    };
+    let least = candidates.iter().map(|candidate| candidate.0).fold(f64::INFINITY, f64::min);
+    let slower = (slowest < least * speed).then_some(slowest);
     let mut best: Option<(PlantFile<'a>, Judged)> = None;
     let mut refusal: Option<Error> = None;
-    for candidates in candidates.chunks(TOGETHER) {
-        let examined: Vec<_> = candidates.par_iter().map(examine).collect();
-        for (other, judged) in examined {
-            match judged {
-                Ok(Some(judged)) if judged.is_green(&file.robustness) => return Ok(other),
-                Ok(Some(judged)) => {
-                    let better =
-                        |(_, earlier): &(_, Judged)| judged.is_better(earlier, &file.robustness);
-                    if best.as_ref().is_none_or(better) {
-                        best = Some((other, judged));
+    for speed in std::iter::once(speed).chain(slower) {
+        let examine = |&(of_feedback, of_observer): &(f64, f64)| {
+            let feedback = of_feedback * speed;
+            let other = with(file, feedback, of_observer * feedback);
+            let judged = judged(&other, !large);
+            (other, judged)
+        };
+        for candidates in candidates.chunks(TOGETHER) {
+            let examined: Vec<_> = candidates.par_iter().map(examine).collect();
+            for (other, judged) in examined {
+                match judged {
+                    Ok(Some(judged)) if judged.is_green(&file.robustness) => return Ok(other),
+                    Ok(Some(judged)) => {
+                        let better = |(_, earlier): &(_, Judged)| {
+                            judged.is_better(earlier, &file.robustness)
+                        };
+                        if best.as_ref().is_none_or(better) {
+                            best = Some((other, judged));
+                        }
                     }
+                    Ok(None) => {}
+                    Err(error) => refusal = refusal.or(Some(error)),
                 }
-                Ok(None) => {}
-                Err(error) => refusal = refusal.or(Some(error)),
+            }
+            // If the first candidates are refused, the reason is the plant, not these bandwidths.
+            if budget.is_over() || (best.is_none() && refusal.is_some()) {
+                break;
             }
         }
-        // If the first candidates are refused, the reason is the plant, not the bandwidth.
-        if budget.is_over() || (best.is_none() && refusal.is_some()) {
+        let is_low = |(_, judged): &(_, Judged)| {
+            judged.peak_of_choice(&file.robustness) <= file.robustness.red
+        };
+        if budget.is_over() || best.as_ref().is_some_and(is_low) {
             break;
         }
     }
@@ -151,18 +164,19 @@ fn with<'a>(file: &PlantFile<'a>, feedback: f64, observer: f64) -> PlantFile<'a>
     other
 }
 
-/// Returns the speed of the plant in rad/s, to which the bandwidths are relative: a stated bandwidth of the feedback,
-/// else the median of the moduli of the eigenvalues that are stated for the feedback, else of those of the plant.
+/// Returns the speeds of the plant in rad/s, to which the bandwidths are relative: a stated bandwidth of the feedback,
+/// else the median and the least of the moduli of the eigenvalues that are stated for the feedback, else of those of the
+/// plant.
 ///
-/// Eigenvalues that are 0 up to rounding errors do not count; if no other ones exist, the median is replaced by
-/// [`WITHOUT_SPEED`]. The result is raised to twice the largest real part, then limited by sample time and delays.
-fn speed(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<f64, Error> {
+/// Eigenvalues that are 0 up to rounding errors do not count; if no other ones exist, both speeds are [`WITHOUT_SPEED`].
+/// The results are raised to twice the largest real part, then limited by sample time and delays.
+fn speeds(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<[f64; 2], Error> {
     let stated: Vec<Complex<f64>> = match (&file.feedback.requirement, file.sampling) {
         (Requirement::Eigenvalues(all), _) => all.clone(),
         (Requirement::SampledEigenvalues(all), Some(Sampling { period, .. })) => {
             all.iter().map(|value| value.ln() / period).collect()
         }
-        (Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }), _) => return Ok(*rate),
+        (Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }), _) => return Ok([*rate; 2]),
         _ => Vec::new(),
     };
     let a = &plant.undelayed.a;
@@ -179,12 +193,12 @@ fn speed(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<f64, Error> {
         size > NO_SPEED * largest && (changed - size).abs() < 0.5 * size
     });
     let sizes: Vec<_> = speeds.map(|(size, _)| size).collect();
-    let median = sizes.get(sizes.len() / 2).copied().unwrap_or(WITHOUT_SPEED);
+    let of = |at: usize| sizes.get(at).copied().unwrap_or(WITHOUT_SPEED);
     let unstable = all.iter().map(|value| value.re).fold(0.0, f64::max);
     let of_samples = file.sampling.map_or(f64::INFINITY, |sampling| PER_SAMPLE / sampling.period);
     // A loop with a delay is hardly faster than 1 rad in the time of the delay.
     let most = of_samples.min(1.0 / plant.delays.longest());
-    Ok(median.max(2.0 * unstable).min(most))
+    Ok([of(sizes.len() / 2), of(0)].map(|speed| speed.max(2.0 * unstable).min(most)))
 }
 
 /// Whether `error` is at the place of a requirement that the file leaves open.
