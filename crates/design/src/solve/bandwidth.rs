@@ -99,7 +99,7 @@ fn method(bandwidth: &Bandwidth, name: &str, loop_gain: f64, residual: f64) -> S
         ", chosen by the verdict as the file states no requirement"
     };
     let why = match loop_gain {
-        gain if gain > 1.1 => Some("the unstable modes need more"),
+        gain if gain > 1.1 => Some("no weight gives less, for unstable modes or by rounding"),
         gain if gain < 0.9 => Some("no weight reaches it"),
         _ => None,
     };
