@@ -286,6 +286,7 @@ def test_a_measure_from_the_start_of_a_fault_is_nan_in_the_run_without_one(text)
         ({"measures": {"m": "__import__('os').system('true')"}}, "unknown function"),
         ({"measures": {"m": "parameter('k')"}}, "no parameter k"),
         ({"measures": {}}, "at least one measure"),
+        ({"measures": {"m": lambda results: 1.0}}, "measures.m: expected a function of two arguments"),
         ({"limits": {"speed": {"below": 1.0}}}, "no measure"),
         ({"limits": {"peak": {"below": "1 mm"}}}, "a finite number"),
         ({"faults": [{"connection": "plant.u", "bias": {"value": "x"}}]}, "value"),

@@ -656,6 +656,36 @@ def test_the_claims_of_the_paper_have_the_values_of_the_command(campaign, tmp_pa
         assert row[name] == pytest.approx(value, rel=2e-2), name
 
 
+FUNCTIONS = """
+system = "paper"
+[experiment]
+stop-time = 0.02
+[parameters]
+"plant.F_c" = {{ from = 20.0, to = 30.0, steps = 12 }}
+[measures]
+last = {{ python = "last.py:last" }}
+"""
+
+
+def test_a_function_that_fails_in_every_run_ends_the_campaign_and_the_folder_takes_the_corrected_one(campaign, tmp_path):
+    words, file = (campaign(text=FUNCTIONS), "--out", tmp_path / "out", "--workers", 1), tmp_path / "last.py"
+    for text, message in {
+        "def last(results):\n    return 1.0\n": "measures.last: expected a function of two arguments",
+        "def last(results, values):\n    return result['plant.x_p'][-1]\n": (
+            "measures.last: NameError: name 'result' is not defined, in each of the first 10 runs: "
+        ),
+    }.items():
+        file.write_text(text, encoding="utf-8")
+        status, out, messages = done(*words)
+        assert (status, out, messages.count("\n")) == (1, "", 1)
+        assert messages.startswith("error: ") and message in messages
+    body = "    if values['plant.F_c'] > 29.5:\n        raise IndexError('no row')\n    return results['plant.x_p'][-1]\n"
+    file.write_text(f"def last(results, values):\n{body}", encoding="utf-8")
+    status, out, messages = done(*words)
+    assert status == 0 and "1 of 12 runs did not finish" in out
+    assert messages.startswith("warning: 1 of 12 runs failed in a measure; run 11: measures.last: IndexError: no row (")
+
+
 def test_functions_are_measures_and_a_changed_one_is_another_campaign(tmp_path):
     scale = 1e3
 

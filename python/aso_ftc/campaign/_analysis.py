@@ -38,6 +38,9 @@ _EVEN = ("latin-hypercube", "sobol", "halton")
 _RESAMPLES, _ROWS_OF_A_CALL = 100, 4_000_000
 # Random permutations of a test; its least p-value is 1 / (1 + permutations).
 _PERMUTATIONS = 4_999
+# How the reason of a run starts that failed in a measure, not in its simulation.
+MEASURE = "measures."
+NO_VALUE = "for a run without a value, a function may return math.nan"
 # Parts that are read in place; more are merged first.
 _PARTS = 100
 
@@ -605,6 +608,18 @@ class Outcome:
         from . import _page
 
         _page.write(self, Path(path), force)
+
+
+def warn_of_measures(outcome: Outcome) -> bool:
+    """Warn of runs that count as failed because a measure of theirs failed; return whether there are any."""
+    if not outcome.unfinished.any():
+        return False
+    reasons = outcome.read(["reason"])["reason"][outcome.unfinished].astype(str)
+    failed = reasons[reasons.str.startswith(MEASURE)]
+    if len(failed):
+        sentence = f"{len(failed)} of {len(outcome)} runs failed in a measure; run {failed.index[0]}: {failed.iloc[0]}"
+        warnings.warn(f"{sentence} ({NO_VALUE})", stacklevel=4)
+    return len(failed) > 0
 
 
 def describe(limit: Mapping[str, float] | None) -> str:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from ._analysis import Outcome
     from ._search import RareEvent, WorstCase
 
-__all__ = ["Campaign", "Function", "Plan"]
+__all__ = ["Campaign", "Function", "Plan", "check_arguments"]
 
 # A function of the user: file and name, or the function itself.
 Function = tuple[str, str] | Callable[..., Any]
@@ -543,6 +543,7 @@ def _system(entries: dict[str, Any], folder: Path) -> System:
 
 def _function(place: str, text: Any, folder: Path) -> Function:
     if callable(text):
+        check_arguments(place, text)
         function: Function = text
         return function
     path, _, name = str(text).rpartition(":")
@@ -552,6 +553,20 @@ def _function(place: str, text: Any, folder: Path) -> Function:
     if not file.is_file():
         raise fail(place, f"there is no file {file}")
     return str(file), name
+
+
+def check_arguments(place: str, function: Callable[..., Any]) -> None:
+    """Refuse a function that cannot be called with results and values."""
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):
+        # Some functions in C have none.
+        return
+    try:
+        signature.bind(None, None)
+    except TypeError:
+        stated = f"{getattr(function, '__name__', 'function')}{signature}"
+        raise fail(place, f"expected a function of two arguments, such as f(results, values), found {stated}") from None
 
 
 def _describe_function(function: Function) -> dict[str, str]:

@@ -24,7 +24,7 @@ import numpy as np
 from .._core import LiveView
 from .._errors import ConfigurationError, Error
 from .._progress import draw, has_lines
-from ._analysis import Outcome, load
+from ._analysis import MEASURE, NO_VALUE, Outcome, load, warn_of_measures
 from ._campaign import Campaign
 from ._folder import Folder, column
 from ._packages import package
@@ -49,6 +49,8 @@ _KNOWN = 5.0
 _LOGGERS = [
     f"distributed{name}" for name in ("", ".client", ".scheduler", ".nanny", ".worker", ".core", ".batched")
 ]
+# Runs after which a campaign ends, or all of them, if each has failed in a measure.
+_TRIED = 10
 # Seconds between two looks at the tasks.
 _PAUSE = 0.02
 
@@ -68,7 +70,9 @@ def execute(
         with _quiet(), _viewed(work, live), _client(workers, scheduler) as client:
             work.perform(client, scheduler)
 
-    return _outcome(campaign, path, progress, perform)
+    outcome = _outcome(campaign, path, progress, perform)
+    warn_of_measures(outcome)
+    return outcome
 
 
 def _outcome(campaign: Campaign, path: Path, progress: bool, perform: Callable[[_Work], None]) -> Outcome:
@@ -79,7 +83,11 @@ def _outcome(campaign: Campaign, path: Path, progress: bool, perform: Callable[[
         if not folder.manifest["complete"]:
             work = _Work(campaign, folder, progress)
             if work.open_parts:
-                perform(work)
+                try:
+                    perform(work)
+                except Error:
+                    folder.discard()
+                    raise
             work.close()
     return load(folder.path)
 
@@ -367,6 +375,8 @@ class _Work:
         # Rows of parts that are not whole yet, by the first run of the part.
         self.rows: dict[int, dict[int, Row]] = {}
         self.last = self.total
+        # The tasks so far if each of their runs failed in a measure; `None` if one did not.
+        self.unmeasured: list[Sequence[Row]] | None = None if self.done else []
         self.view: _View | None = None
         self._stopper = _Stopper(campaign) if campaign.stop else None
         self._advance()
@@ -408,14 +418,15 @@ class _Work:
                 if not tasks:
                     break
                 numbers, result = tasks.next(self._attend)
-                if isinstance(result, list):
-                    self._accept(result)
-                elif not isinstance(result, distributed.KilledWorker):
-                    raise gone if result is None else _of_worker(result)
-                elif len(numbers) > 1:
+                if isinstance(result, distributed.KilledWorker) and len(numbers) > 1:
                     suspects.extend(numbers)
-                else:
-                    self._accept([_lost(numbers[0], self.campaign.unfinished)])
+                    continue
+                if isinstance(result, distributed.KilledWorker):
+                    result = [_lost(numbers[0], self.campaign.unfinished)]
+                elif not isinstance(result, list):
+                    raise gone if result is None else _of_worker(result)
+                for rows in self._with_measures(result):
+                    self._accept(rows)
                 # The parts before an early end are done.
                 if self.last < self.total:
                     tasks.cancel()
@@ -476,6 +487,20 @@ class _Work:
             {name: [row[0][name] for row in rows] for name in names},
             [row[1] for row in rows],
         )
+
+    def _with_measures(self, rows: Sequence[Row]) -> list[Sequence[Row]]:
+        """Return the tasks to accept: none while each run so far has failed in a measure, which ends the campaign soon."""
+        if self.unmeasured is None:
+            return [rows]
+        self.unmeasured.append(rows)
+        if not all(row.reason.startswith(MEASURE) for row in rows):
+            tasks, self.unmeasured = self.unmeasured, None
+            return tasks
+        count = sum(map(len, self.unmeasured))
+        if count < min(_TRIED, self.total):
+            return []
+        which = "the only run" if self.total == 1 else f"each of the first {count} runs"
+        raise Error(f"{rows[0].reason}, in {which}: correct the measure and start again; {NO_VALUE}", "Measure")
 
     def _accept(self, rows: Sequence[Row]) -> None:
         first = rows[0].run - rows[0].run % self.size

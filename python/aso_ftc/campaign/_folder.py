@@ -143,6 +143,11 @@ class Folder:
         """Write the manifest."""
         write(self.path / MANIFEST, (json.dumps(self.manifest, indent=1) + "\n").encode())
 
+    def discard(self) -> None:
+        """Let a folder without runs be that of another campaign."""
+        if not any((self.path / name).exists() for name in ("runs", "signals")):
+            (self.path / MANIFEST).unlink(missing_ok=True)
+
     def finish(self, runs: int) -> None:
         """State that all runs are done."""
         self.manifest["complete"] = True

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import plain
+from ._analysis import warn_of_measures
 from ._changes import arguments
 from ._engine import Session
 from ._entries import fail, whole
@@ -87,6 +88,7 @@ class _Batches:
     def __init__(self, campaign: Campaign, path: Path, session: Session, measure: str) -> None:
         self.campaign, self.path, self.session, self.measure = campaign, path, session, measure
         self.count = self.runs = self.unfinished = 0
+        self.warned = False
 
     def part(self, unit: Numbers) -> Campaign:
         """Return the campaign with one run for each row of positions in [0, 1], and each fault."""
@@ -107,6 +109,7 @@ class _Batches:
         part = self.part(unit)
         outcome = self.session.outcome(part, self.path / f"batch-{self.count:05}")
         self.count += 1
+        self.warned = self.warned or warn_of_measures(outcome)
         values = sign * outcome.read([self.measure])[self.measure].to_numpy(dtype=float)
         self.runs += len(values)
         self.unfinished += int(outcome.unfinished.sum())

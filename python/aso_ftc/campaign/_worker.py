@@ -17,7 +17,7 @@ import numpy as np
 from .. import _core
 from .._errors import Error, RunError, TimeLimitError
 from .._system import System, files_named_by
-from ._campaign import Campaign, Function
+from ._campaign import Campaign, Function, check_arguments
 from ._changes import arguments, changes
 from ._faults import FaultCase
 from ._folder import parquet_bytes
@@ -154,6 +154,7 @@ class Runner:
             user_function = runpy.run_path(path).get(attribute)
             if not callable(user_function):
                 raise Error(f"measures.{name}: {Path(path).name} has no function {attribute}")
+            check_arguments(f"measures.{name}", user_function)
             self.functions[name] = user_function
         signals = sorted(set().union(*(expression.signals for expression in self.expressions.values())))
         # A function of the user may read every input, output and local variable.
@@ -186,7 +187,7 @@ class Runner:
             for name, expression in self.expressions.items():
                 row.measures[name] = expression.value(results, results.time, values, start)
             for name, function in self.functions.items():
-                row.measures[name] = float(function(results, {**values, "fault": fault.label}))
+                row.measures[name] = _value(name, function, results, {**values, "fault": fault.label})
         except TimeLimitError as error:
             row.status, row.reason = "time limit", str(error)
         except RunError as error:
@@ -226,6 +227,14 @@ class Runner:
 def holds(limit: Mapping[str, float], value: float) -> bool:
     """Whether a value is within its limit; NaN is not."""
     return value < limit["below"] if "below" in limit else value > limit["above"]
+
+
+def _value(name: str, function: Callable[..., Any], *arguments: Any) -> float:
+    """Return a measure of a function of the user; its exception names the measure."""
+    try:
+        return float(function(*arguments))
+    except Exception as error:
+        raise Error(f"measures.{name}: {type(error).__name__}: {error}", "Measure") from error
 
 
 def _status(error: RunError) -> str:
