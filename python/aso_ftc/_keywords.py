@@ -15,11 +15,12 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def keywords(others: Mapping[str, str]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def keywords(others: Mapping[str, str], name: str | None = None) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Let a function say what to write for a keyword that it does not have.
 
     Args:
         others: what to use instead of the keywords of other packages.
+        name: the function that users call; default: this one.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -27,10 +28,10 @@ def keywords(others: Mapping[str, str]) -> Callable[[Callable[P, R]], Callable[P
 
         @functools.wraps(function)
         def checked(*args: P.args, **kwargs: P.kwargs) -> R:
-            for name in kwargs:
-                if name not in known:
-                    hint = f"; use {others[name]}" if name in others else similar(name, known)
-                    raise TypeError(f"{function.__name__}() has no argument {name!r}{hint}")
+            for keyword in kwargs:
+                if keyword not in known:
+                    hint = f"; use {others[keyword]}" if keyword in others else similar(keyword, known)
+                    raise TypeError(f"{name or function.__name__}() has no argument {keyword!r}{hint}")
             return function(*args, **kwargs)
 
         return checked

@@ -658,6 +658,7 @@ def _text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
+@keywords(_FMPY, "check")
 def _changes(
     *,
     start_values: Mapping[str, Any] | None = None,

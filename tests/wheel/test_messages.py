@@ -60,6 +60,8 @@ def test_a_keyword_that_is_wrong_is_named_with_the_right_one(call):
     ]:
         with pytest.raises(TypeError, match=rf"has no argument '{name}'; {text}"):
             call(pendulum(), **{name: 1})
+    with pytest.raises(TypeError, match=r"^check\(\) has no argument 'stop_tim'; similar: stop_time"):
+        af.paper().check(stop_tim=1)
 
 
 def test_an_argument_of_another_type_is_named_with_the_expected_one(paper, tmp_path):
