@@ -656,6 +656,15 @@ def test_the_claims_of_the_paper_have_the_values_of_the_command(campaign, tmp_pa
         assert row[name] == pytest.approx(value, rel=2e-2), name
 
 
+def test_a_script_that_its_workers_would_run_again_gets_one_error(tmp_path):
+    script = tmp_path / "script.py"
+    text = 'import aso_ftc as af\naf.campaign.Campaign("paper", measures={"m": "max(plant.x_p)"}).run("out", workers=1)\n'
+    script.write_text(text, encoding="utf-8")
+    process = subprocess.run([sys.executable, "-I", str(script)], cwd=tmp_path, capture_output=True, text=True, timeout=180)
+    assert process.returncode == 1 and process.stderr.count("Traceback") == 1
+    assert process.stderr.endswith('the local workers do not start; a script runs campaigns below `if __name__ == "__main__":`\n')
+
+
 FUNCTIONS = """
 system = "paper"
 [experiment]

@@ -447,7 +447,8 @@ class Campaign:
         Raises:
             ConfigurationError: something is wrong that is known before the first run, the folder has
                 another campaign, or another process runs a campaign in it.
-            Error: the scheduler was lost, or the disk is full. The same call goes on.
+            Error: a measure fails in each of the first runs, the scheduler was lost, or the disk is full. The same call
+                goes on.
         """
         from ._engine import execute
 

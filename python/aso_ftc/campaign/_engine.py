@@ -192,14 +192,18 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
         else:
             place = opened.enter_context(tempfile.TemporaryDirectory(prefix="aso-ftc-"))
             with _without_interrupts():
-                cluster = distributed.LocalCluster(
-                    n_workers=os.cpu_count() or 1 if workers is None else workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    dashboard_address=":0",
-                    local_directory=place,
-                    silence_logs=logging.CRITICAL,
-                )
+                try:
+                    cluster = distributed.LocalCluster(
+                        n_workers=os.cpu_count() or 1 if workers is None else workers,
+                        threads_per_worker=1,
+                        processes=True,
+                        dashboard_address=":0",
+                        local_directory=place,
+                        silence_logs=logging.CRITICAL,
+                    )
+                except RuntimeError:
+                    sentence = 'the local workers do not start; a script runs campaigns below `if __name__ == "__main__":`'
+                    raise Error(sentence, "Worker") from None
                 opened.callback(cluster.close, timeout=10)
             client = distributed.Client(cluster, set_as_default=False)
         try:

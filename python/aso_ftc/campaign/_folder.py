@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import multiprocessing
 import os
 import re
 from collections.abc import Iterator
@@ -65,6 +66,9 @@ def locked(folder: Path) -> Iterator[None]:
         ConfigurationError: another process runs a campaign in the folder.
         ResultsError: the folder cannot be written.
     """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        # This process is a worker that imports the script of the campaign; its nanny sees that it does not start.
+        raise SystemExit(1)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock = _core.lock_file(str(folder / _LOCK))
