@@ -659,6 +659,8 @@ def test_a_results_file_dropped_on_the_page_is_drawn(open_page):
     assert names == ["a", "b[1,2]"] and list(read("b[1,2]")) == [2, 3]
     assert page.evaluate("document.querySelectorAll('#dropped canvas').length") == 2
     assert page.evaluate(FILE_STATUS) == "own.csv: 2 rows, 2 variables."
+    names, _ = shown(page, "texts.csv", b"time,a,mode,none\n0,1,on,\n1,2,off,\n")
+    assert names == ["a"] and "Columns without numbers are left out: mode, none." in page.evaluate(FILE_STATUS)
     # The line of the run is another one, and the answer is in the window.
     assert page.evaluate(STATUS) == "Ready."
     assert page.evaluate(

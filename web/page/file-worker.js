@@ -1,5 +1,5 @@
 // Reads a results file. Messages in: {kind: "open", file}, {kind: "read", name}. Messages out: {kind: "opened", time, names,
-// units, count}, {kind: "values", values}, {kind: "progress", part}, {kind: "refused", text}. A gap is NaN.
+// units, count, remark}, {kind: "values", values}, {kind: "progress", part}, {kind: "refused", text}. A gap is NaN.
 let table = null; // {read: a function from a name to numbers}
 
 // The places of a separator outside of quotes.
@@ -31,6 +31,12 @@ function instant(cell, isComma) {
   if (!date) return number(cell, isComma);
   const [, day, clock = "00:00", part = "", hours = "+00", minutes = "00"] = date;
   return Date.parse(`${day}T${clock}${hours}:${minutes}`) / 1000 + Number(`0${part}`);
+}
+
+// Names the columns without numbers.
+function remarkOn(names) {
+  const more = names.length > 10 ? ` and ${names.length - 10} more` : "";
+  return names.length > 0 ? ` Columns without numbers are left out: ${names.slice(0, 10).join(", ")}${more}.` : "";
 }
 
 // The most frequent of tab, semicolon and comma.
@@ -114,7 +120,8 @@ async function openCsv(file, begin) {
   columns = columns.map((column) => column.subarray(0, count));
   const numeric = names.filter((_, k) => k !== place && columns[k].some((value) => value === value));
   table = { read: async (name) => columns[names.indexOf(name)].slice() };
-  return { time: names[place], names: numeric, units, count };
+  const others = names.filter((name, k) => k !== place && !numeric.includes(name));
+  return { time: names[place], names: numeric, units, count, remark: remarkOn(others) };
 }
 
 // A value of a Parquet file as a number.
@@ -133,7 +140,8 @@ async function openParquet(file) {
   const codecs = new Set(metadata.row_groups.flatMap(({ columns }) => columns.map((column) => column.meta_data.codec)));
   const isPlain = [...codecs].every((codec) => codec === "UNCOMPRESSED" || codec === "SNAPPY");
   const compressors = isPlain ? undefined : (await import("./codecs.min.js")).compressors;
-  const leaves = parquetSchema(metadata).children.filter(({ children, element }) => children.length === 0 && element.type !== "BYTE_ARRAY" && element.type !== "FIXED_LEN_BYTE_ARRAY");
+  const all = parquetSchema(metadata).children;
+  const leaves = all.filter(({ children, element }) => children.length === 0 && element.type !== "BYTE_ARRAY" && element.type !== "FIXED_LEN_BYTE_ARRAY");
   const names = leaves.map(({ element }) => element.name);
   const count = Number(metadata.num_rows);
   if (names.length < 2) throw new Error("expected a column of times and variables that are numbers");
@@ -153,7 +161,8 @@ async function openParquet(file) {
     if (times[k] < times[k - 1]) throw new Error(`row ${k + 1}: the time ${times[k]} is before ${times[k - 1]}, the time of the row above; sort the rows by their time`);
   }
   table = { read };
-  return { time, names: names.filter((name) => name !== time), units: {}, count };
+  const others = all.filter((column) => !leaves.includes(column)).map(({ element }) => element.name);
+  return { time, names: names.filter((name) => name !== time), units: {}, count, remark: remarkOn(others) };
 }
 
 const actions = {

@@ -110,7 +110,7 @@ export async function showFile(file, place, status) {
   }));
   place.append(filter, choice, figures);
   const drawn = Math.min(names.length, MOST_AT_FIRST);
-  say(`${file.name}: ${times.count} rows, ${names.length} variables${drawn < names.length ? `; ${drawn} are drawn, choose others below` : ""}.${answer.remark ?? ""}`);
+  say(`${file.name}: ${times.count} rows, ${names.length} variables${drawn < names.length ? `; ${drawn} are drawn, choose others below` : ""}.${answer.remark}`);
   for (const name of names.slice(0, MOST_AT_FIRST)) await choose(name, true);
   place.dataset.shown = file.name;
 }
