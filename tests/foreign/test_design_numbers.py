@@ -352,6 +352,12 @@ def test_the_singular_values_are_those_of_numpy(case):
         assert sigma == pytest.approx(np.array(values), rel=1e-5, abs=1e-9)
 
 
+def test_t_has_as_many_singular_values_as_its_rank(case):
+    counts = {curve["name"]: len(curve["singular_values"]) for curve in case[0].report["robustness"]["curves"]}
+    rank = min(counts["S at the input"], counts["S at the output"])
+    assert counts["T at the input"] == counts["T at the output"] == rank
+
+
 def must_have_energy_norms(designed, matrices):
     """Compares H2 and generalised H2 norm with scipy; returns all norms."""
     norms = {norm["name"]: norm["value"] for norm in designed.report["certificate"]["norms"]}

@@ -402,9 +402,16 @@ fn curves(closed_loop: &Loop) -> Result<Vec<Frequency>, Error> {
     let systems = POINTS.into_iter().flat_map(|(at, name)| {
         [("S", closed_loop.sensitivity(at), name), ("T", closed_loop.complementary(at), name)]
     });
+    let systems: Vec<_> = systems.collect();
+    // The rank of T, a product of plant and controller; its other singular values are rounding errors.
+    let rank = systems.iter().map(|(_, system, _)| system.d.nrows()).min().unwrap_or(0);
     let one = |(symbol, system, name): &(&str, StateSpace, &str)| {
         let grid = frequency_grid(system, POINTS_PER_DECADE)?;
-        frequency(format!("{symbol} at the {name}"), system, grid)
+        let mut curves = frequency(format!("{symbol} at the {name}"), system, grid);
+        if let (Ok(curves), "T") = (&mut curves, *symbol) {
+            curves.singular_values.truncate(rank);
+        }
+        curves
     };
-    systems.collect::<Vec<_>>().par_iter().map(one).collect()
+    systems.par_iter().map(one).collect()
 }
