@@ -384,24 +384,36 @@ def test_of_two_commands_on_one_folder_the_second_is_refused_until_the_first_one
     assert table["twice"] == np.array([40.0, 42.0, 44.0, 46.0]).tobytes()
 
 
-def test_a_campaign_that_is_done_is_not_done_again(campaign, tmp_path):
-    file, folder = campaign(runs=8), tmp_path / "out"
-    assert done(file, "--out", folder, "--workers", 1)[0] == 0
+@pytest.fixture(scope="module")
+def eight_runs(tmp_path_factory):
+    """The folder of the campaign with 8 runs, which are done."""
+    folder = tmp_path_factory.mktemp("eight")
+    (folder / "small.toml").write_text(CAMPAIGN.format(runs=8, stop=0.3), encoding="utf-8")
+    assert done(folder / "small.toml", "--out", folder / "out", "--workers", 1)[0] == 0
+    return folder / "out"
+
+
+@pytest.fixture
+def finished(campaign, eight_runs, tmp_path):
+    """The file of a campaign, and a folder of its own in which it is done."""
+    return campaign(runs=8), Path(shutil.copytree(eight_runs, tmp_path / "out"))
+
+
+def test_a_campaign_that_is_done_is_not_done_again(finished):
+    file, folder = finished
     times = {path: path.stat().st_mtime_ns for path in (folder / "runs").iterdir()}
     assert done(file, "--out", folder, "--workers", 1)[0] == 0
     assert times == {path: path.stat().st_mtime_ns for path in (folder / "runs").iterdir()}
 
 
-def test_the_command_reads_no_table_of_all_columns(campaign, tmp_path, monkeypatch):
-    file, folder = campaign(runs=4), tmp_path / "out"
-    assert done(file, "--out", folder, "--workers", 1)[0] == 0
+def test_the_command_reads_no_table_of_all_columns(finished, monkeypatch):
+    file, folder = finished
     monkeypatch.setattr(af.campaign.Outcome, "table", None)
     assert main([str(file), "--out", str(folder)]) == 0
 
 
-def test_a_folder_with_another_campaign_or_with_other_files_is_left_alone(campaign, tmp_path):
-    file, folder = campaign(runs=8), tmp_path / "out"
-    assert done(file, "--out", folder, "--workers", 1)[0] == 0
+def test_a_folder_with_another_campaign_or_with_other_files_is_left_alone(campaign, finished, tmp_path):
+    file, folder = finished
     status, _, messages = done(campaign(runs=12), "--out", folder)
     assert status == 2
     assert "another campaign" in messages and messages.count("\n") == 1
@@ -412,9 +424,8 @@ def test_a_folder_with_another_campaign_or_with_other_files_is_left_alone(campai
     assert "not empty" in messages
 
 
-def test_a_run_is_repeated_by_the_command_run(campaign, tmp_path):
-    file, folder = campaign(runs=6), tmp_path / "out"
-    assert done(file, "--out", folder, "--workers", 1)[0] == 0
+def test_a_run_is_repeated_by_the_command_run(finished, tmp_path):
+    _, folder = finished
     outcome = af.campaign.load(folder)
     status, text, _ = done(folder, "--show", 4)
     assert status == 0
@@ -610,16 +621,15 @@ def test_a_campaign_on_an_ssd_takes_the_fmus_beside_it_to_its_workers(tmp_path):
     assert set(before) == {str(structure)} and system.files() != before
 
 
-def test_a_full_disk_ends_the_campaign_with_one_sentence(campaign, tmp_path):
-    folder = tmp_path / "out"
-    assert done(campaign(runs=8), "--out", folder, "--workers", 1)[0] == 0
+def test_a_full_disk_ends_the_campaign_with_one_sentence(finished):
+    file, folder = finished
     shutil.rmtree(folder / "runs")
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     manifest["complete"] = False
     (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
     # A file in the place of the folder of parts: writing fails as on a full disk, also for root.
     (folder / "runs").write_text("", encoding="utf-8")
-    status, _, messages = done(campaign(runs=8), "--out", folder, "--workers", 1)
+    status, _, messages = done(file, "--out", folder, "--workers", 1)
     assert status == 1
     assert messages.startswith("error: cannot write ") and messages.count("\n") == 1
 
