@@ -352,15 +352,14 @@ def test_numbers_of_numpy_and_distributions_of_scipy_are_entries():
     design = {"method": "latin-hypercube", "runs": np.int64(8)}
     one, other = (paper(parameters=entries, design=design, seed=np.uint8(3)) for entries in (frozen, named))
     assert columns(one) == columns(other) and one.describe() == other.describe()
-    whole = paper(
     assert columns(paper(parameters={"plant.F_c": range(20, 23)})) == {"plant.F_c": [20, 21, 22]}
+    whole = paper(
         parameters={"n": {"distribution": stats.randint(1, 5), "set": "algorithm.jobs"}},
         design={"method": "random", "runs": 50},
     )
     assert set(columns(whole)["n"]) == {1, 2, 3, 4}
 
 
-def test_tables_have_names_of_python_or_of_the_file():
 def test_a_campaign_travels():
     parameters = {
         "plant.F_c": stats.norm(25.0, 2.0),
@@ -375,6 +374,7 @@ def test_a_campaign_travels():
         assert list(ours.quantile(np.array([0.0, 0.3]))) == list(theirs.quantile(np.array([0.0, 0.3])))
 
 
+def test_tables_have_names_of_python_or_of_the_file():
     stop_times = [
         Campaign("paper", experiment={name: 0.1}, measures=MEASURES).system.experiment["stop-time"]
         for name in ("stop_time", "stop-time")

@@ -608,6 +608,7 @@ class Outcome:
         from . import _page
 
         _page.write(self, Path(path), force)
+        return Path(path)
 
 
 def warn_of_measures(outcome: Outcome) -> bool:
@@ -623,17 +624,6 @@ def warn_of_measures(outcome: Outcome) -> bool:
 
 
 def describe(limit: Mapping[str, float] | None) -> str:
-        return Path(path)
-
-
-def warn_of_measures(outcome: Outcome) -> bool:
-    """Warn of runs that count as failed because a measure of theirs failed; return whether there are any."""
-    reasons = outcome.read(["reason"])["reason"][outcome.unfinished].astype(str)
-    failed = reasons[reasons.str.startswith(MEASURE)]
-    if len(failed):
-        sentence = f"{len(failed)} of {len(outcome)} runs failed in a measure; run {failed.index[0]}: {failed.iloc[0]}"
-        warnings.warn(f"{sentence} ({NO_VALUE})", stacklevel=4)
-    return len(failed) > 0
     """Return a limit as text, such as ``"below 0.001"``."""
     return " and ".join(f"{word} {value:g}" for word, value in (limit or {}).items())
 
