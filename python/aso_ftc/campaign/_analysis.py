@@ -51,14 +51,16 @@ def batches(names: Iterable[str], size: int = 8) -> Iterator[list[str]]:
     return (known[start : start + size] for start in range(0, len(known), size))
 
 
-def outside(values: NDArray[np.float64], limit: Mapping[str, float]) -> NDArray[np.bool_]:
-    """Return which values do not satisfy ``value < below`` and ``value > above``; NaN satisfies nothing."""
-    inside = np.ones(len(values), dtype=bool)
-    if "below" in limit:
-        inside &= values < limit["below"]
-    if "above" in limit:
-        inside &= values > limit["above"]
-    return ~inside
+def holds(limit: Mapping[str, float], value: Any) -> Any:
+    """Return whether a value, or each one of an array, is within its limit; NaN is not."""
+    return value < limit["below"] if "below" in limit else value > limit["above"]
+
+
+def bounds(failures: int, runs: int, confidence: float) -> tuple[float, float]:
+    """Return the bounds of Clopper and Pearson of a probability; see :meth:`Outcome.failure_probability`."""
+    test = package("scipy.stats").binomtest(failures, runs)
+    interval = test.proportion_ci(confidence_level=confidence, method="exact")
+    return float(interval.low), float(interval.high)
 
 
 @dataclass(frozen=True)
@@ -430,7 +432,7 @@ class Outcome:
         failed = self.unfinished
         for name in [limit] if limit is not None else known:
             values = np.asarray(self.read([name])[name].to_numpy(), dtype=np.float64)
-            failed = failed | outside(values, known[name])
+            failed = failed | ~holds(known[name], values)
         return failed
 
     def failure_probability(
@@ -492,8 +494,6 @@ class Outcome:
         if count == 0:
             raise ConfigurationError("a failure probability needs at least one finished run", "NoRuns")
         failures = int(failed[rows].sum())
-        test = package("scipy.stats").binomtest(failures, count)
-        bounds = test.proportion_ci(confidence_level=confidence, method="exact")
         notes = []
         if method in _EVEN:
             notes.append(
@@ -511,7 +511,7 @@ class Outcome:
                 f"take longer because of how they behave"
             )
         name = "any limit" if limit is None else limit
-        low, high = float(bounds.low), float(bounds.high)
+        low, high = bounds(failures, count, confidence)
         return Probability(name, failures, count, failures / count, low, high, confidence, "; ".join(notes))
 
     # Which parameter, which fault.

@@ -24,11 +24,11 @@ import numpy as np
 from .._core import LiveView
 from .._errors import ConfigurationError, Error
 from .._progress import draw, has_lines
-from ._analysis import MEASURE, NO_VALUE, Outcome, load, warn_of_measures
+from ._analysis import MEASURE, NO_VALUE, Outcome, bounds, holds, load, warn_of_measures
 from ._campaign import Campaign
 from ._folder import Folder, column
 from ._packages import package
-from ._worker import Job, Row, holds
+from ._worker import Job, Row
 
 __all__ = ["Session", "execute"]
 
@@ -582,9 +582,8 @@ class _Stopper:
         bad = sum(status != "ok" or not holds(self.limit, value) for value, status in pairs)
         self.runs, self.failures = self.runs + table.num_rows, self.failures + bad
         self.next += self.size
-        test = package("scipy.stats").binomtest(self.failures, self.runs)
-        bounds = test.proportion_ci(confidence_level=self.stopping["confidence"], method="exact")
-        return bool(bounds.high - bounds.low <= self.stopping["width"])
+        low, high = bounds(self.failures, self.runs, self.stopping["confidence"])
+        return bool(high - low <= self.stopping["width"])
 
 
 def _plugin(name: str, job: bytes) -> Any:

@@ -17,6 +17,7 @@ import numpy as np
 from .. import _core
 from .._errors import Error, RunError, TimeLimitError
 from .._system import System, files_named_by
+from ._analysis import holds
 from ._campaign import Campaign, Function, check_arguments
 from ._changes import arguments, changes
 from ._faults import FaultCase
@@ -222,11 +223,6 @@ class Runner:
         if row.status != "ok":
             return bool(keep.get("unfinished", False))
         return any(not holds(self.job.limits[name], row.measures[name]) for name in keep.get("outside", ()))
-
-
-def holds(limit: Mapping[str, float], value: float) -> bool:
-    """Whether a value is within its limit; NaN is not."""
-    return value < limit["below"] if "below" in limit else value > limit["above"]
 
 
 def _value(name: str, function: Callable[..., Any], *arguments: Any) -> float:
