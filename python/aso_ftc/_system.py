@@ -113,7 +113,9 @@ class System:
     ) -> None:
         self._folder = os.path.abspath(os.fspath(folder) if folder is not None else os.getcwd())
         config = {} if description is None else description
-        if not isinstance(config, (str, Mapping)) or (isinstance(config, str) and os.path.isfile(config)):
+        if not isinstance(config, (str, Mapping)) or (
+            isinstance(config, str) and (config.endswith(".toml") or os.path.isfile(config))
+        ):
             kind = f"the file {config}" if isinstance(config, str) else type(config).__name__
             raise TypeError(f"expected the text of a system.toml or a dict, found {kind}; System.from_toml reads files")
         self._adopt(_core.check_configuration(config, self._folder))

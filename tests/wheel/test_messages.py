@@ -72,6 +72,7 @@ def test_an_argument_of_another_type_is_named_with_the_expected_one(paper, tmp_p
         (lambda: paper.run(algorithm="jacobi"), "algorithm is a dict, .* found the text 'jacobi'"),
         (lambda: af.System(str(path)), "System.from_toml reads files"),
         (lambda: af.System(path), "System.from_toml reads files"),
+        (lambda: af.System("missing.toml"), "found the file missing.toml; System.from_toml reads files"),
     ]:
         with pytest.raises(TypeError, match=text):
             call()
