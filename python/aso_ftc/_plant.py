@@ -108,6 +108,9 @@ def _entries(a: Any, b: Any, c: Any, d: Any = 0.0) -> dict[str, Any]:
     """Return the matrices as lists of rows; a vector is a column of B, a row of C."""
     import numpy
 
+    for name, matrix in zip("ABCD", (a, b, c, d)):
+        if numpy.iscomplexobj(matrix) and numpy.imag(matrix).any():
+            raise DesignError(f"{name}: expected real numbers, found complex ones", "Entry")
     matrices = {name: numpy.asarray(matrix, dtype=float) for name, matrix in zip("ABC", (a, b, c))}
     matrices["A"] = numpy.atleast_2d(matrices["A"])
     states = len(matrices["A"])

@@ -347,6 +347,8 @@ def test_a_wrong_system_says_what_is_expected():
         af.design(signal.dlti([1.0], [1.0, -0.5]), **REQUIREMENTS)
     with pytest.raises(af.DesignError, match="C has 3 elements and A 2 rows"):
         af.design((SERVO[0], SERVO[1], [1.0, 0.0, 0.0]), **REQUIREMENTS)
+    with pytest.raises(af.DesignError, match="^A: expected real numbers, found complex ones"):
+        af.design((SERVO[0] + 1j, *SERVO[1:]), **REQUIREMENTS)
     with pytest.raises(af.DesignError, match="stands without its conjugate"):
         af.design(SERVO, **{**REQUIREMENTS, "feedback": {"eigenvalues": [-1 + 1j, -2]}})
     with pytest.raises(af.DesignError, match=r"\[1, 2\] = 0\.5 and \[2, 1\] = 0\.1"):
