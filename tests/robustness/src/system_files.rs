@@ -6,11 +6,14 @@ use master::signal::{Cursor, Interpolation, Signal, Track};
 use ssp::{self, SspError};
 use study::table::{self, Table, TableError};
 
+/// What a reader of SSP files returns: the content, and warnings.
+type Reading<T> = Result<(T, Vec<String>), SspError>;
+
 /// Content that was read is written and reads back the same; an error states what was expected, and
 /// where.
 fn both_ways<T: Debug + PartialEq>(
     data: &[u8],
-    read: fn(&[u8]) -> Result<(T, Vec<String>), SspError>,
+    read: fn(&[u8]) -> Reading<T>,
     render: fn(&T) -> String,
 ) {
     match read(data) {
