@@ -6,6 +6,7 @@ x_hat and f_hat are the predictions. The input is the fault f, the outputs are
 """
 
 import json
+import re
 import tomllib
 
 import numpy as np
@@ -53,7 +54,12 @@ actuator_faults = "all"
 """
 
 
-# Proofs and bounds take most of the time of a design, and its gains do not depend on them.
+def says_nothing(done):
+    """Whether a design reports no more than where it is, as after each ten seconds."""
+    return re.fullmatch(r"(\d+ s, .*\n)*", done.stderr) is not None
+
+
+# Proofs, bounds and remedies take most of the time of a design, and its gains do not depend on them.
 WITHOUT_PROOFS = ("--certificate-time", "0")
 
 
