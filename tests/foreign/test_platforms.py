@@ -234,10 +234,11 @@ def simulated(fmu, target, environment=None):
     other starts to listen. The test then starts them again.
     """
     command = [sys.executable, "-c", SIMULATE, fmu, target]
-    for _ in range(10):
+    # The pages for a browser are built at the same time.
+    for patience in (20, 20, 40, 40, 80, 80, 160):
         child = subprocess.Popen(command, env=environment, start_new_session=True)
         try:
-            assert child.wait(timeout=20) == 0
+            assert child.wait(timeout=patience) == 0
             return np.load(target)
         except subprocess.TimeoutExpired:
             os.killpg(child.pid, signal.SIGKILL)
