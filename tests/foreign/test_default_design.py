@@ -41,14 +41,12 @@ def peaks(plant, gains):
     gain = np.vstack([gains["L_x"], gains["L_f"]])
     a_0 = np.block([[a, b], [np.zeros((m, n + m))]])
     observer = a_0 + np.vstack([b, np.zeros((m, m))]) @ k - gain @ np.hstack([c, np.zeros((p, m))])
-    peak = np.zeros(2)
     speeds = np.abs(np.concatenate([np.linalg.eigvals(a), np.linalg.eigvals(observer)]))
-    for w in np.geomspace(1e-3 * speeds[speeds > 1e-9].min(), 1e2 * speeds.max(), 3000):
-        response = c @ np.linalg.solve(1j * w * np.eye(n) - a, b)
-        controller = k @ np.linalg.solve(1j * w * np.eye(n + m) - observer, gain)
-        for at, opened in enumerate((controller @ response, response @ controller)):
-            peak[at] = max(peak[at], np.linalg.norm(np.linalg.inv(np.eye(len(opened)) - opened), 2))
-    return peak
+    s = 1j * np.geomspace(1e-3 * speeds[speeds > 1e-9].min(), 1e2 * speeds.max(), 3000)[:, None, None]
+    response = c @ np.linalg.solve(s * np.eye(n) - a, b)
+    controller = k @ np.linalg.solve(s * np.eye(n + m) - observer, gain)
+    sensitivities = (np.linalg.inv(np.eye(one.shape[-1]) - one) for one in (controller @ response, response @ controller))
+    return np.array([np.linalg.norm(matrices, 2, axis=(1, 2)).max() for matrices in sensitivities])
 
 
 # The measurements with different units, so that the peak of S is judged in the units that make it least.

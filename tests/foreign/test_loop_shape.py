@@ -49,21 +49,18 @@ def weighted(design, plant, omega):
     c_0 = np.hstack([c, np.zeros((len(c), m))])
     gain, observer = np.hstack([k_x, -np.eye(m)]), np.vstack([l_x, l_f])
     a_k = a_0 + b_0 @ gain - observer @ c_0
-    largest = 0.0
-    for w in omega:
-        s = 1j * w
-        g = c @ np.linalg.solve(s * np.eye(n) - a, b)
-        k = gain @ np.linalg.solve(s * np.eye(n + m) - a_k, observer)
-        of_s = abs((s / PEAK + bandwidth) / (s + FLOOR * bandwidth))
-        corner = ROLL_OFF * bandwidth
-        of_t = abs((s / corner + 1) / (s * FLOOR / corner + 1)) / PEAK
-        for opened in (k @ g, g @ k):
-            unit = np.eye(len(opened))
-            sensitivity = np.linalg.inv(unit - opened)
-            largest = max(largest, of_s * np.linalg.norm(sensitivity, 2))
-            largest = max(largest, of_t * np.linalg.norm(unit - sensitivity, 2))
-        largest = max(largest, np.linalg.norm(k @ sensitivity, 2) / effort)
-    return largest
+    s, corner = 1j * omega[:, None, None], ROLL_OFF * bandwidth
+    g = c @ np.linalg.solve(s * np.eye(n) - a, b)
+    k = gain @ np.linalg.solve(s * np.eye(n + m) - a_k, observer)
+    of_s = abs((s / PEAK + bandwidth) / (s + FLOOR * bandwidth))
+    of_t = abs((s / corner + 1) / (s * FLOOR / corner + 1)) / PEAK
+    peaks = []
+    for opened in (k @ g, g @ k):
+        unit = np.eye(opened.shape[-1])
+        sensitivity = np.linalg.inv(unit - opened)
+        peaks += [np.linalg.norm(one, 2, axis=(1, 2)).max() for one in (of_s * sensitivity, of_t * (unit - sensitivity))]
+    peaks.append(np.linalg.norm(k @ sensitivity, 2, axis=(1, 2)).max() / effort)
+    return max(peaks)
 
 
 @pytest.mark.parametrize("name", PLANTS)

@@ -203,7 +203,7 @@ def test_peak_delay_margin_bounds_and_worst_plant_of_samples_alone_are_those_of_
     to_command = commands(design)
     added = np.vstack([b, np.zeros((n + 1, 1))])
     frequencies = np.linspace(0, np.pi, 20_001)[1:]
-    sums = [1 + response(loop, added, to_command, np.exp(1j * angle))[0, 0] for angle in frequencies]
+    sums = 1 + response(loop, added, to_command, np.exp(1j * frequencies)[:, None, None])
     robustness = report["robustness"]
     np.testing.assert_allclose(robustness["points"][0]["s_peak"], np.max(np.abs(sums)), rtol=1e-4)
     # The largest delay in whole samples.
