@@ -167,7 +167,7 @@ impl Fmu {
 
     /// Returns the description whose variables the instances have. This is [`Fmu::description`] with a variable for
     /// each element of an array at the start values of its structural parameters (FMI 3.0), and a separate value
-    /// reference for each negated alias (FMI 1.0).
+    /// reference for each negated alias (FMI 1.0). An array whose elements are listed as scalars, too, is left out.
     ///
     /// # Errors
     ///

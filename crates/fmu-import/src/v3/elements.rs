@@ -164,8 +164,8 @@ fn count(extents: &[u64]) -> usize {
     usize::try_from(product).unwrap_or(usize::MAX)
 }
 
-/// Returns whether each element of an array is listed as a scalar, too, as in FMU containers; `scalars` are the names of all
-/// scalars.
+/// Returns whether each element of an array is listed as a scalar, too, as in FMU containers. `scalars` are the names of
+/// all scalars.
 fn elements_are_scalars(
     variable: &ScalarVariable,
     extents: &[u64],
