@@ -119,7 +119,7 @@ observer.bandwidth = 930000
 
 @pytest.mark.parametrize("plant, level", [(AIRCRAFT, "green"), (TAPE, "amber")], ids=["below both limits", "below the red limit"])
 def test_units_remove_a_peak_that_comes_from_signals_without_units(aso_ftc, tmp_path, plant, level):
-    _, report = design_and_report(aso_ftc, tmp_path, plant)
+    _, report = design_and_report(aso_ftc, tmp_path, plant, WITH_REMEDIES)
     (remedy,) = report["verdict"]["remedies"]
     assert report["verdict"]["level"] == "red" and remedy["change"].startswith("state the unit of each measurement")
     units = 'measurements = [{ name = "pitch", unit = "rad" }, { name = "speed", unit = "ft/s" }]\n'
@@ -161,7 +161,7 @@ loop.bandwidth = 6
     ids=["eigenvalues", "shape of the loop", "shape in place of bandwidths", "chosen bandwidths", "slower shape"],
 )
 def test_the_lines_that_follow_a_reason_of_the_verdict_give_the_stated_peaks(aso_ftc, tmp_path, plant):
-    _, report = design_and_report(aso_ftc, tmp_path, plant)
+    _, report = design_and_report(aso_ftc, tmp_path, plant, WITH_REMEDIES)
     verdict = report["verdict"]
     assert verdict["level"] != "green" and [one["reason"] for one in verdict["remedies"]] == verdict["reasons"]
     remedies = [remedy for remedy in verdict["remedies"] if remedy["lines"]]
@@ -193,7 +193,7 @@ observer.bandwidth = 10.0
 
 
 def test_a_loop_that_is_not_stable_has_a_remedy_that_makes_it_green(aso_ftc, tmp_path):
-    _, report = design_and_report(aso_ftc, tmp_path, DELAYED)
+    _, report = design_and_report(aso_ftc, tmp_path, DELAYED, WITH_REMEDIES)
     (remedy,) = report["verdict"]["remedies"]
     assert report["robustness"] is None and remedy["reason"] in report["verdict"]["reasons"]
     names = {line.split(" = ")[0] for line in remedy["lines"]}
@@ -205,7 +205,7 @@ def test_a_loop_that_is_not_stable_has_a_remedy_that_makes_it_green(aso_ftc, tmp
 
 
 def test_fewer_faults_make_a_plant_robust_whose_stationary_gain_is_nearly_singular(aso_ftc, tmp_path):
-    _, report = design_and_report(aso_ftc, tmp_path, COLUMN)
+    _, report = design_and_report(aso_ftc, tmp_path, COLUMN, WITH_REMEDIES)
     assert report["robustness"]["tolerance"]["stable"] < 0.9
     (remedy,) = report["verdict"]["remedies"]
     names = {line.split(" = ")[0] for line in remedy["lines"]}
