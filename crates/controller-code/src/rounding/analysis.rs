@@ -100,7 +100,8 @@ impl<'a> Analysis<'a> {
         kind.count(self.controller)
     }
 
-    /// A matrix of the controller; without it zero, or for `A_f` the identity, as faults are then constant.
+    /// A matrix of the controller. One that the design does not have is zero; `A_f` is the identity, as faults are
+    /// constant then.
     fn matrix(&self, matrix: Matrix) -> DMatrix<f64> {
         let [rows, columns] = matrix.kinds().map(|kind| self.count(kind));
         let default = || match matrix {

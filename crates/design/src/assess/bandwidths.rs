@@ -169,7 +169,7 @@ fn with<'a>(file: &PlantFile<'a>, feedback: f64, observer: f64) -> PlantFile<'a>
 /// plant.
 ///
 /// Eigenvalues that are 0 up to rounding errors do not count; if no other ones exist, both speeds are [`WITHOUT_SPEED`].
-/// The results are raised to twice the largest real part, then limited by sample time and delays.
+/// Each is at least twice the largest real part of an eigenvalue, and at most what sample time and delays permit.
 fn speeds(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<[f64; 2], Error> {
     let stated: Vec<Complex<f64>> = match (&file.feedback.requirement, file.sampling) {
         (Requirement::Eigenvalues(all), _) => all.clone(),

@@ -299,9 +299,9 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         Ok(effort)
     }
 
-    /// Returns the instabilities of estimation error and state feedback that the search limits beside that of the loop.
-    /// They are eigenvalues of the loop, unless it has a better approximation of the delays; -infinity for one that
-    /// needs no limit.
+    /// Returns the instability of the estimation error and that of the state feedback. Without delays they are parts of
+    /// the loop, which has another limit: -infinity for the feedback, and for the error without integral action. With
+    /// delays, the loop is computed with a better approximation than that of the observer.
     fn excesses(
         &self,
         has_integrals: bool,
