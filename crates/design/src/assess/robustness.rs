@@ -109,10 +109,10 @@ pub(crate) fn hold_reason(designed: &Solution, robustness: &Robustness) -> Optio
     let is_short = designed.domain == Domain::Continuous && hold < SHORT_HOLD * delay;
     (is_short && delay.is_finite()).then(|| {
         let (hold, delay) = (rounded(hold), rounded(delay));
-        let help = "a slower observer, a lower `effort` of `[loop]` or a `sample_time` helps";
+        let help = "a slower observer, a lower loop.effort or a sample_time helps";
         let text = format!(
             "plant and controller may hold their signals for {hold} s at most, although the delay margin is {delay} s: \
-             the controller is much faster than its loop; {help}"
+             the controller is much faster than its loop (amber); {help}"
         );
         (Level::Amber, text)
     })
